@@ -4,7 +4,6 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.refused import refused
 from wildlab.detection import boards
 from wildlab.detection.boards import Board, find_board, grey8
 from wildlab.geometry.board_views import Views, parameters_of, project_board
@@ -75,20 +74,6 @@ def test_what_is_not_there_is_not_found():
         find_board(grey8(image(BOARDS[0], np.random.default_rng(1), 200, 50)), Board("chessboard", 9, 8))
         is None
     )
-
-
-def test_points_of_a_staggered_grid_are_half_a_step_apart():
-    points = Board("staggered circles", 4, 3, 0.01).points
-    np.testing.assert_allclose(points[0], [0, 0, 0])
-    np.testing.assert_allclose(points[1], [0.02, 0, 0])
-    np.testing.assert_allclose(points[4], [0.01, 0.01, 0])
-    np.testing.assert_allclose(points[8], [0, 0.02, 0])
-
-
-@pytest.mark.parametrize("wrong", [(2, 6, 0.025), (9, 101, 0.025), (9, 6, 0.0), (9, 6, float("nan"))])
-def test_a_board_that_is_none_is_refused(wrong):
-    with refused("3 to 100"):
-        Board("chessboard", *wrong)
 
 
 def test_corners_are_where_edges_cross():

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from tests.detection.ellipses import inside
-from tests.refused import refused
 from wildlab.detection.centres import adjust_at_border, border_moves, to_border
 from wildlab.detection.floating import detect_floating
 
@@ -64,14 +63,3 @@ def test_of_a_broken_contour_the_axis_is_not_trusted():
     line = replace(seen, area=0.3 * seen.area)
     assert not np.array_equal(adjust_at_border(seen, image.shape, 124.0).uv, seen.uv)
     assert np.array_equal(adjust_at_border(line, image.shape, 124.0).uv, seen.uv)
-
-
-def test_the_nearer_border():
-    assert to_border(np.array([9.5, 50.0]), np.array([1.0, 0.0]), 100, 100) == -10
-    assert to_border(np.array([90.5, 50.0]), np.array([1.0, 0.0]), 100, 100) == 9
-    assert to_border(np.array([50.0, 10.5]), np.array([0.0, 1.0]), 100, 100) == -11
-
-
-def test_a_length_of_nothing_is_refused():
-    with refused("above zero", field="length"):
-        adjust_at_border(detect_floating(ellipse_image()), (200, 260), 0.0)

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from tests.refused import refused
 from wildlab.detection.colour import Colour, coloured, find_coloured
 from wildlab.detection.detections import Detections
 
@@ -95,17 +94,6 @@ def test_centres_lie_in_their_ellipses_as_often_as_they_say():
     # Drawn ones have no weakly coloured rim, for which the default allows more.
     assert np.mean(np.array(squares) < chi2.ppf(0.9, 2)) > 0.87
     assert np.abs(np.mean(apart, axis=0)).max() < 0.06
-
-
-def test_what_cannot_be_is_refused():
-    for call, about in (
-        (lambda: find_coloured(np.zeros((20, 30), np.uint8), np.ones((20, 30), bool)), "no colours"),
-        (lambda: Colour(saturation=(0.9, 0.1)), "saturation"),
-        (lambda: Colour(hue=(100, 250)), "hue"),
-        (lambda: Colour(smallest_px=0), "below zero"),
-    ):
-        with refused(about):
-            call()
 
 
 @pytest.mark.parametrize("factor", [2, 3])

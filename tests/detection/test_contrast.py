@@ -11,7 +11,7 @@ import pytest
 from tests.detection.ellipses import inside as inside_ellipse
 from tests.refused import refused
 from wildlab.detection.contrast import Contrast, find_by_contrast
-from wildlab.detection.detections import Detections, describe, join, no_detections, remove_near
+from wildlab.detection.detections import Detections, describe, join, no_detections
 from wildlab.detection.warm import (
     Warm,
     block_from_distance,
@@ -174,16 +174,6 @@ def at(uv: list[list[float]], score: list[float]) -> Detections:
     return describe(labels, 1.0 * (labels > 0), EVERYWHERE, score=score)
 
 
-def test_of_those_too_near_the_surest_stays():
-    found = at([[20, 20], [28, 20], [36, 20], [100, 20]], [1.0, 3.0, 2.0, 0.5])
-    left = remove_near(found, 10)
-    assert left.uv[:, 0].tolist() == [28, 100] and left.score.tolist() == [3.0, 0.5]
-    assert len(remove_near(found, 0)) == 4
-    # What was removed removes nothing.
-    chain = at([[20, 20], [28, 20], [36, 20]], [3.0, 2.0, 1.0])
-    assert remove_near(chain, 10).uv[:, 0].tolist() == [20, 36]
-
-
 @pytest.mark.parametrize("find", [warm, by_contrast])
 def test_an_even_image_has_nothing(find):
     assert len(find(np.full((160, 200), 100, np.uint8))) == 0
@@ -207,24 +197,6 @@ def test_what_is_too_hot_for_an_animal_is_left_out_in_kelvin():
     assert len(warm(kelvin, window=window)) == 2
     cool = warm(kelvin, window=window, hottest=320.0)
     assert np.allclose(cool.uv, [[50, 80]], atol=0.1) and cool.intensity[0] == 300
-
-
-def test_f_in_a_black_hot_image_and_beside_a_border():
-    image = np.full((160, 200), 150, np.uint8)
-    image[ellipse(50, 80, 9, 6)] = 40
-    assert len(warm(image)) == 0
-    assert len(warm(image, warm_is_bright=False)) == 1
-    valid = EVERYWHERE.copy()
-    valid[:, :60] = False
-    assert len(find_warm(image, valid, Warm(warm_is_bright=False))) == 0
-
-
-def test_a_share_of_the_strongest_leaves_the_weak_out():
-    image = ground(noise=1.0)
-    image[ellipse(50, 40, 12, 10)] += 150
-    image[ellipse(150, 100, 9, 6)] += 30
-    assert len(by_contrast(image)) == 2
-    assert np.allclose(by_contrast(image, of_image=0.5).uv, [[50, 40]], atol=0.5)
 
 
 def test_noise_of_a_window_keeps_rough_ground_quiet():

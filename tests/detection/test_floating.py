@@ -4,14 +4,12 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from tests.refused import refused
 from wildlab.detection.centres import cut_sides
 from wildlab.detection.floating import (
     FloatingThresholds,
     detect_floating,
     find_edges,
     find_objects,
-    nested_in_boxes,
     to_grey,
 )
 
@@ -151,12 +149,6 @@ def test_a_buoy_in_the_corner_of_a_slanting_ships_box_is_lost_by_boxes_and_kept_
     assert len(detect_floating(image, thresholds=FloatingThresholds(nested="contours"))) == 2
 
 
-def test_boxes_in_boxes():
-    boxes = np.array([[0, 0, 50, 50], [10, 10, 20, 20], [40, 40, 20, 20], [0, 0, 50, 50], [10, 10, 20, 20]])
-    assert nested_in_boxes(boxes).tolist() == [False, True, False, False, True]
-    assert nested_in_boxes(np.empty((0, 4))).tolist() == []
-
-
 @pytest.mark.parametrize(
     "where",
     [
@@ -210,40 +202,3 @@ def test_areas_go_with_the_height():
     assert filled.at_height(200, 100).smallest_area == 12.5
     assert filled.at_height(50, 100).largest_area == 3200
     assert ring_.at_height(50, 100).largest_area is None
-
-
-@pytest.mark.parametrize("height", [0.0, -5.0, float("nan")])
-def test_a_height_below_the_sea_is_refused(height):
-    with refused("above zero", field="height"):
-        FloatingThresholds().at_height(height, 100)
-
-
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [
-        ("gradient", 0.0),
-        ("gradient", 300.0),
-        ("smallest_area", 0.0),
-        ("largest_area", 10.0),
-        ("smoothing_size", 4),
-        ("smoothing_sd", 0.0),
-        ("stretched_share", 0.5),
-        ("smallest_range_k", 0.0),
-        ("counts_per_kelvin", -1.0),
-        ("gradient_gain", 0.0),
-        ("scaling", "squeezed"),
-        ("clipping", "none"),
-        ("area_of", "box"),
-        ("nested", "no"),
-    ],
-)
-def test_unusable_thresholds_are_refused(name, value):
-    with refused(field=name):
-        FloatingThresholds(**{name: value})
-
-
-def test_unusable_images_are_refused():
-    with refused("grey"):
-        detect_floating(np.zeros((5, 5, 3), np.uint8))
-    with refused("each pixel"):
-        detect_floating(sea(), np.ones((3, 3), bool))

@@ -6,10 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.refused import refused
 from wildlab.detection.flow import (
     agreeing,
-    filled_outlines,
     find_features,
     match_features,
     nearest_by_ratio,
@@ -109,16 +107,6 @@ def test_the_scatter_of_few_features_is_that_of_what_moved_them():
     assert exact.sd == 0.07, "features that fit exactly are not known exactly"
 
 
-def test_an_open_contour_is_filled_by_its_convex_outline():
-    labels = np.zeros((40, 60), np.int32)
-    labels[10, 10:50] = labels[10:30, 10] = labels[29, 10:50] = 1  # open to the right
-    labels[35:38, 2:5] = 2
-    inside = filled_outlines(labels)
-    assert inside[10:30, 10:50].all() and inside[35:38, 2:5].all()
-    assert inside.sum() == 20 * 40 + 9
-    assert not filled_outlines(np.zeros((4, 4), np.int32)).any()
-
-
 def test_nothing_is_found_where_nothing_is():
     even, empty = np.full(SHAPE, 290.0), np.zeros(SHAPE, bool)
     picture = shifted(texture(6), 0, 0)
@@ -131,13 +119,6 @@ def test_nothing_is_found_where_nothing_is():
     other = shifted(texture(7), 0, 0)
     assert len(matched(picture, other, EVERYWHERE, EVERYWHERE)) < 6
     assert len(agreeing(np.zeros((2, 2)), np.zeros((2, 2)))) == 0
-
-
-def test_what_does_not_fit_is_refused():
-    with refused("image"):
-        find_features(np.zeros((4, 4, 3)), EVERYWHERE)
-    with refused("mask"):
-        find_features(np.zeros((4, 4)), EVERYWHERE)
 
 
 # --- the oracle: a textured plane that moves, and a camera that moves and turns over it

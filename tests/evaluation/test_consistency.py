@@ -11,7 +11,6 @@ from wildlab.evaluation.consistency import (
     chi_square_interval,
     nees,
     nis,
-    position_nees,
     share_inside,
     simulate_filter_runs,
     whiten,
@@ -25,12 +24,6 @@ from wildlab.evaluation.consistency import (
 def test_limits_as_printed_in_example_3_1(dof, runs, printed, digits):
     low, high = chi_square_interval(dof, runs=runs)
     assert (round(low, digits + (printed[0] == 0.051)), round(high, digits)) == printed
-
-
-@pytest.mark.parametrize("arguments", [(0,), (2, 1.0), (2, 0.0), (2, 0.95, 0)])
-def test_limits_that_do_not_exist_are_refused(arguments):
-    with pytest.raises(WildlabError, match=r"(?i)one of each"):
-        chi_square_interval(*arguments)  # type: ignore[arg-type]
 
 
 def test_nees_is_its_definition():
@@ -48,14 +41,6 @@ def test_moments_without_truth_stay_in_their_row():
     np.testing.assert_array_equal(nees(e, np.eye(2)), [1.0, np.nan, 4.0])
     assert share_inside([1.0, np.nan, 4.0], (0.5, 2.0)) == 0.5
     assert np.isnan(share_inside([np.nan], (0.0, 1.0)))
-
-
-def test_a_covariance_that_is_none_is_named_by_its_row():
-    P = np.array([np.eye(2), np.diag([1.0, -1.0])])
-    with pytest.raises(WildlabError, match="row 1"):
-        nees(np.ones((2, 2)), P)
-    with pytest.raises(WildlabError, match="do not go"):
-        nees(np.ones((2, 2)), np.eye(3))
 
 
 @pytest.mark.parametrize("claimed", [1.0, 0.5])
@@ -86,17 +71,6 @@ def test_the_truth_has_an_uncertainty_of_its_own():
     np.testing.assert_allclose(nees(e, P, np.zeros((2, 2))), nees(e, P))
     with pytest.raises(WildlabError, match="does not go"):
         nees(e, P, np.eye(4))
-
-
-def test_position_alone_is_the_marginal():
-    rng = np.random.default_rng(7)
-    root = rng.standard_normal((4, 4))
-    P = root @ root.T + np.eye(4)
-    e = rng.multivariate_normal(np.zeros(4), P, 20_000)
-    own = np.diag([2.0, 1.0])
-    np.testing.assert_allclose(position_nees(e, P, own), nees(e[:, :2], P[:2, :2] + own))
-    assert kstest(position_nees(e, P), chi2(2).cdf).pvalue > 0.01
-    assert kstest(nees(e, P), chi2(4).cdf).pvalue > 0.01
 
 
 def test_whitened_errors_have_unit_covariance():

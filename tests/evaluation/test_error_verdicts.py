@@ -58,13 +58,6 @@ def test_the_share_is_of_all_points_where_only_some_have_the_axis():
     assert one.share == pytest.approx(1 - (without**2).sum() / (errors**2).sum(), rel=1e-6)
 
 
-def test_points_without_an_axis_and_lost_points_are_left_out():
-    errors = np.array([[1.0, 0.0], [np.nan, np.nan], [3.0, 0.0]])
-    axes = {"seen": np.array([[1.0, 0.0], [1.0, 0.0], [np.nan, np.nan]]), "none": np.full((3, 2), np.nan)}
-    found = split_along(errors, axes, [0, 1, 2])
-    assert list(found) == ["seen"] and found["seen"].n == 1 and not found["seen"].constant
-
-
 @pytest.mark.parametrize(
     ("stated", "word"),
     [(2.0, "honest"), (0.7, "too small"), (6.0, "too large"), (2.1, "honest")],
@@ -105,16 +98,6 @@ def test_few_honest_ellipses_are_rarely_called_dishonest(images, points):
         inside += found.factor.low <= 1.0 <= found.factor.high
     assert words.count("too large") <= 10 and words.count("too small") <= 10
     assert inside >= 85
-
-
-def test_too_few_or_too_scattered_for_a_verdict_on_ellipses():
-    P = np.tile(np.eye(2), (240, 1, 1))
-    rng = np.random.default_rng(0)
-    assert judge_ellipses(normal(1), P, np.arange(240) // 60, rng).word == "too few"
-    assert judge_ellipses(normal(1) * np.nan, P, BLOCKS, rng).word == "too few"
-    wild = normal(2, n=240) * np.exp(np.repeat(rng.normal(0, 1.2, 8), 30))[:, None]
-    assert judge_ellipses(wild, 2 * P, np.arange(240) // 30, rng).word in ("undecided", "too small")
-    assert judge_ellipses(wild, 400 * P, np.arange(240) // 30, rng).word != "honest"
 
 
 def test_the_spread_of_sightings_is_that_of_one_and_blind_to_what_all_share():

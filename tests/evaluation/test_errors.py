@@ -17,12 +17,6 @@ def test_summary_of_a_known_set():
     assert (s.sd_north, s.sd_east) == pytest.approx((3.0, 4.0))
 
 
-def test_nothing_left_is_nan_and_not_a_crash():
-    s = summarise(np.full((4, 2), np.nan))
-    assert s.n == 0
-    assert np.isnan(s.mean)
-
-
 def test_scatter_finds_what_was_put_in():
     rng = np.random.default_rng(0)
     image = np.repeat(np.arange(800), 4)

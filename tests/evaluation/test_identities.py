@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wildlab.errors import WildlabError
 from wildlab.evaluation.identities import Moment, compare_identities, gospa
 
 CUTOFF = 20.0
@@ -88,14 +87,6 @@ def test_where_not_all_targets_are_known_no_track_is_false():
     assert compare_identities([*scans, late], CUTOFF).false_tracks_per_minute == pytest.approx(1 / 3)
 
 
-def test_a_look_without_tracks_makes_no_swap():
-    """Two tracks are nearer to each other's target, before and after a look that shows none."""
-    targets = {"A": (0, 0), "B": (6, 0)}
-    right, wrong = scan(0, {1: (0, 0), 2: (6, 0)}, targets), scan(1, {1: (6, 0), 2: (0, 0)}, targets)
-    none = scan(2, {}, targets)
-    assert compare_identities([right, wrong, none, wrong._replace(time=3.0)], CUTOFF).swaps == 0
-
-
 def test_a_break_is_a_new_identity_on_the_same_target():
     tracks = [{1: (0, 0)}, {}, {2: (0, 0)}, {2: (0, 0)}, {1: (0, 0)}]
     found = compare_identities([scan(t, one, {"A": (0, 0)}) for t, one in enumerate(tracks)], CUTOFF)
@@ -118,13 +109,6 @@ def test_false_tracks_by_the_minute():
     assert [found.tracks[one].false for one in (1, 2, 3)] == [False, True, True]
     assert found.false_tracks_per_minute == pytest.approx(4)
     assert np.isnan(compare_identities([scan(0, {}, target)], CUTOFF).false_tracks_per_minute)
-
-
-def test_a_scan_has_half_of_the_time_to_either_neighbour():
-    """Of 180 s the scan that is left out has 30 s before it and 60 s after it."""
-    scans = [scan(t, {1: (0, 0), 2: (90, 0)}, {"A": (0, 0)}) for t in (0, 60, 180)]
-    scans[1] = scans[1]._replace(complete=False)
-    assert compare_identities(scans, CUTOFF).false_tracks_per_minute == pytest.approx(60 / 90)
 
 
 def test_a_track_on_a_target_for_half_of_its_scans_is_not_false():
@@ -280,34 +264,6 @@ def test_dont_care_against_every_pairing(x, y, flags):
     hidden = [name for name, flag in zip(range(4), flags, strict=True) if flag]
     found = gospa_of(scan(0, dict(enumerate(x)), dict(enumerate(y)), ignored=hidden), CUTOFF)
     assert np.isclose(found.distance**2, possible, atol=1e-6).any()
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"identities": [1, 1]}, "track 1"),
-        ({"names": ["A", "A"]}, "target 'A'"),
-        ({"positions": [[0, 0], [np.nan, 0]]}, "not finite"),
-        ({"truth": [[0, 0], [np.inf, 0]]}, "not finite"),
-        ({"covariances": np.eye(2)}, "do not fit"),
-        ({"visible": [True]}, "do not fit"),
-        ({"positions": [[0, 0, 0], [0, 0, 1]]}, "do not fit"),
-    ],
-)
-def test_what_is_refused(change, words):
-    good = scan(0, {1: (0, 0), 2: (9, 9)}, {"A": (0, 0), "B": (9, 9)})
-    with pytest.raises(WildlabError, match=words):
-        compare_identities([good._replace(**change)], CUTOFF)
-    with pytest.raises(WildlabError, match=words):
-        gospa_of(good._replace(**change), CUTOFF)
-
-
-def test_scans_out_of_order_are_refused():
-    one = scan(1, {}, {})
-    for scans in ([], [one, scan(0, {}, {})], [scan(np.nan, {}, {})]):
-        with pytest.raises(WildlabError, match="order of time"):
-            compare_identities(scans, CUTOFF)
-    assert compare_identities([one, one], CUTOFF).targets == {}
 
 
 def test_the_truth_own_error_is_beside_the_tracks():

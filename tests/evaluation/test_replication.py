@@ -10,8 +10,6 @@ from wildlab.evaluation import intervals as order
 from wildlab.evaluation import replication as r
 from wildlab.evaluation.replication import operating_characteristics
 
-Pair = tuple[float, float]
-
 
 @pytest.mark.parametrize(
     ("kind", "here", "published", "centre", "predicted", "words"),
@@ -77,15 +75,6 @@ def test_one_more_flight_lies_outside_as_often_as_the_closed_form_says(n):
     outside = (flights[:, 0] < ends[:, 0]) | (flights[:, 0] > ends[:, 1])
     assert order.false_outside(n) <= 0.1
     assert outside.mean() == pytest.approx(order.false_outside(n), abs=3 * (0.09 / 4000) ** 0.5)
-
-
-def test_too_few_flights_have_no_interval():
-    assert (
-        np.isnan(order.prediction_interval(range(18))).all()
-        and np.isnan(order.median_interval(range(4))).all()
-    )
-    assert np.isfinite(order.prediction_interval(np.r_[np.arange(19.0), np.nan])).all()
-    assert np.isnan(r.power_of(range(18), "error size"))
 
 
 def test_power_is_that_of_the_closed_form():

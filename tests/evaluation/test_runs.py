@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest, ttest_1samp
 
-from wildlab.errors import WildlabError
 from wildlab.evaluation import mean_interval, mean_share_interval, share_interval
 
 
@@ -30,11 +29,3 @@ def test_few_runs_have_a_mean_and_no_interval():
         assert found.estimate == 1.0 and np.isnan(found[1:]).all()
     for nothing in (mean_interval([]), mean_share_interval([np.nan]), share_interval(0, 0)):
         assert np.isnan(nothing).all()
-
-
-def test_what_has_no_interval_is_refused():
-    with pytest.raises(WildlabError, match="probability 1"):
-        mean_interval([1.0, 2.0], 1.0)
-    for count, runs, probability in ((1, 0, 0.95), (-1, 5, 0.95), (6, 5, 0.95), (1, 5, 0.0)):
-        with pytest.raises(WildlabError, match=f"{count} of {runs}"):
-            share_interval(count, runs, probability)

@@ -14,7 +14,6 @@ from wildlab.evaluation.matching import (
     difference_of_f1,
     match,
     rates,
-    score_levels,
 )
 
 NONE = np.zeros((0, 4))
@@ -88,13 +87,6 @@ def test_nothing_found_nothing_labelled_and_no_score():
     assert ignored.counts.tolist() == [[0, 0, 1]]
     with pytest.raises(WildlabError, match="score"):
         curve_along_score([ScoredFrame(box, np.array([np.nan]), box, NONE)])
-
-
-def test_levels_keep_the_first_and_the_last():
-    scores = np.random.default_rng(1).random(5000)
-    levels = score_levels(scores, 50)
-    assert len(levels) == 50 and (levels[0], levels[-1]) == (scores.max(), scores.min())
-    assert (np.diff(levels) < 0).all()
 
 
 def test_a_difference_is_of_the_same_draws():

@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from wildlab.errors import WildlabError
 from wildlab.evaluation.identities import gospa
 
 coordinates = st.floats(-40, 40, allow_nan=False, width=32)
@@ -49,16 +48,3 @@ def test_parts_add_up(x, y, cutoff, order):
         g.localisation**order + g.missed**order + g.false**order, abs=1e-6
     )
     assert len(x) - g.n_missed == len(y) - g.n_false
-
-
-@pytest.mark.parametrize(("cutoff", "order"), [(0, 2), (-1, 2), (np.inf, 2), (np.nan, 2), (1, 0.5)])
-def test_what_is_no_metric_is_refused(cutoff, order):
-    with pytest.raises(WildlabError, match="no metric"):
-        gospa(NONE, NONE, cutoff, order)
-
-
-def test_points_that_do_not_fit_are_refused():
-    with pytest.raises(WildlabError, match="do not go"):
-        gospa([[0.0, 0.0]], [[0.0, 0.0, 0.0]], 1)
-    with pytest.raises(WildlabError, match="not finite"):
-        gospa([[0.0, np.nan]], [[0.0, 0.0]], 1)

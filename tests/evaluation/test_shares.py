@@ -52,12 +52,6 @@ def test_only_flights_that_meet_the_premise_are_asked():
     assert (none.verdict, none.share, none.met) == (s.NO_PREMISE, None, 49)
 
 
-def test_what_cannot_be_decided_is_refused():
-    for true, premise in (([], None), ([True, False], [True])):
-        with pytest.raises(WildlabError, match="premise"):
-            s.decide(true, premise)
-
-
 def test_a_measure_is_held_against_the_threshold():
     measured = np.array([0.1, 0.2, 0.3, np.nan])
     assert s.Check(measured=measured).holds(0.25).tolist() == [True, True, False, False]
@@ -121,21 +115,11 @@ def test_images_together_are_held_against_the_threshold(count, of, above, verdic
     assert s.decide_check(check, 0.01).verdict == verdict
 
 
-def test_images_together_need_a_threshold():
-    with pytest.raises(WildlabError, match="no threshold"):
-        s.decide_check(s.Check(measured=np.zeros(6), pooled=s.Pooled(0, 48)))
-
-
 def test_a_calculation_holds_or_does_not_and_has_no_share():
     check = s.Check(measured=np.array([0.55, 0.57]), calculated=True)
     found = [s.decide_check(check, threshold) for threshold in (1.0, 0.5, 0.56)]
     assert [one.verdict for one in found] == [s.HOLDS, s.FAILS, s.UNDECIDED]
     assert all(one.share is None for one in found)
-
-
-def test_any_other_check_is_decided_by_flights():
-    true, premise = np.arange(40) < 30, np.arange(40) < 38
-    assert s.decide_check(s.Check(true=true, premise=premise)) == s.decide(true, premise)
 
 
 def test_what_no_flight_measures_is_not_decided_and_a_flight_without_counts_against():

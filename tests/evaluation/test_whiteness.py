@@ -1,10 +1,8 @@
 """Autocorrelation against its definition and against processes whose answer is known."""
 
 import numpy as np
-import pytest
 from scipy.stats import chi2, kstest
 
-from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import (
     autocorrelation,
     effective_sample_size,
@@ -76,14 +74,3 @@ def test_what_one_element_tells_of_the_next_of_another_is_found():
     white = innovation_whiteness(pair, 10)
     assert (np.abs(white.autocorrelation[:, 1]) < 2 * white.bound).all()
     assert white.p_value < 1e-9
-
-
-def test_innovations_that_are_missing_are_left_out():
-    v = np.random.default_rng(6).normal(size=(60, 2))
-    holes = np.insert(v, [0, 20, 20, 45], np.nan, axis=0)
-    got, expected = innovation_whiteness(holes, 7), innovation_whiteness(v, 7)
-    np.testing.assert_array_equal(got.autocorrelation, expected.autocorrelation)
-    assert (got.n, got.bound, got.statistic) == (60, white_bound(60), expected.statistic)
-    np.testing.assert_allclose(got.autocorrelation[1], autocorrelation(v[:, 1], 7))
-    with pytest.raises(WildlabError, match="59 lags"):
-        innovation_whiteness(v, 59)

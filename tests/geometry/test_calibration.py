@@ -11,7 +11,6 @@ from wildlab.geometry.calibration import (
     apply_calibration,
     calibrate,
     georeference_calibrated,
-    split_images,
 )
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix, rotation_vector_to_matrix
@@ -185,19 +184,3 @@ def test_one_wrong_click_does_not_decide():
     survey.known[7, :2] += 60.0
     found = calibrate(survey.poses_at(), survey.uv, survey.known, survey.image)
     assert np.allclose(apply_calibration(found, PLAIN).misalignment, TRUE.misalignment, atol=np.radians(0.1))
-
-
-def test_halves_keep_images_whole():
-    image = np.repeat(["a", "b", "c", "d", "e"], [1, 4, 2, 3, 5])
-    half = split_images(image, np.random.default_rng(0))
-    for name in np.unique(image):
-        assert len(set(half[image == name])) == 1
-    assert len(np.unique(image[half])) == 3
-
-
-def test_too_few_points_and_unknown_parameters_are_refused():
-    survey = Survey(1, EVERY_WAY)
-    with pytest.raises(ValueError, match="two points"):
-        calibrate(survey.poses_at(), survey.uv * np.nan, survey.known, survey.image)
-    with pytest.raises(ValueError, match="unknown"):
-        calibrate(survey.poses_at(), survey.uv, survey.known, survey.image, ("yaw",))

@@ -11,7 +11,6 @@ from wildlab.geometry.camera import (
     camera_from_data_sheet,
     distort,
     distortion_jacobian,
-    in_image,
     normalise,
     normalise_jacobian,
     project,
@@ -129,16 +128,6 @@ def test_flodell_s_inverse_is_close_for_a_narrow_lens_and_poor_for_a_wide_one():
         assert 0 < error < bound
     wide = np.array([[0.8, 0.0]])
     assert np.abs(undistort_approximately(distort(wide, k), k[0]) - wide).max() > 0.01
-
-
-def test_behind_the_camera_is_nan():
-    assert np.isnan(project(SKYDIO, np.array([[0.0, 0.0, -1.0], [1.0, 1.0, 0.0]]))).all()
-
-
-def test_in_image_minds_its_border_and_nan():
-    uv = np.array([[0.0, 0.0], [5.0, 5.0], [4056.0, 100.0], [np.nan, 1.0]])
-    assert in_image(SKYDIO, uv).tolist() == [True, True, True, False]
-    assert in_image(SKYDIO, uv, 4).tolist() == [False, True, False, False]
 
 
 def test_distortion_agrees_with_opencv():

@@ -4,14 +4,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from wildlab.errors import WildlabError
-from wildlab.geometry.calibration import calibrate
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.geometry.mount import Mount, camera_pose
-from wildlab.geometry.uncertainty import PoseErrors, ground_covariance, ground_jacobians, ray_flatness
 
 CAMERA = Camera(640, 512, 1159.2, 1167.8, 313.0, 265.0)
 MOUNT = Mount("down", tilt=0.1, misalignment=(0.03, -0.05, 0.02), lever_arm=(0.4, -0.1, 0.2))
@@ -65,20 +62,6 @@ def test_some_rows_are_the_poses_of_these_rows_alone(rows):
     assert one.R_bc.shape == (3, 3)
 
 
-def test_runs_and_rows():
-    p = np.arange(24.0).reshape(2, 4, 3)
-    both = CameraPoses(CAMERA, MOUNT, p, np.eye(3))
-    assert both.rows == (2, 4)
-    assert np.array_equal(both.take(1).p_nb, p[1])
-    assert np.array_equal(both.take((slice(None), 3)).p_nb, p[:, 3])
-    assert both.take((slice(None), None)).rows == (2, 1, 4)
-    for rows in ((0, 0, 0), (slice(None), slice(None), 2)):  # not a coordinate of the position
-        with pytest.raises(IndexError, match="too many"):
-            both.take(rows)
-    with pytest.raises(IndexError):
-        both.take(2)
-
-
 def test_one_pose_stands_for_all_rows():
     one = CameraPoses(CAMERA, MOUNT, np.array([0.0, 0.0, -100.0]), np.eye(3))
     uv = np.array([[100.0, 200.0], [300.0, 400.0], [313.0, 265.0]])
@@ -87,41 +70,6 @@ def test_one_pose_stands_for_all_rows():
     assert np.allclose(georeference_pixels(one, uv, 0.0), georeference_pixels(many, uv, 0.0), rtol=1e-14)
     beside = CameraPoses(CAMERA, MOUNT, np.array([0.0, 0.0, -100.0]), np.tile(np.eye(3), (3, 1, 1)))
     same(beside, many)
-
-
-@pytest.mark.parametrize(
-    ("field", "shape"),
-    [
-        ("p_nb", (N, 2)),
-        ("R_nb", (N, 3)),
-        ("R_nb", (N + 1, 3, 3)),
-        ("pan", (N - 1,)),
-        ("tilt", (N, 1)),
-        ("covariance", (N, 3, 3)),
-        ("covariance", (N + 2, 6, 6)),
-    ],
-)
-def test_a_field_of_another_shape_is_named(field, shape):
-    with pytest.raises(WildlabError, match=f"^{field}: "):
-        poses_of(**{field: np.zeros(shape)})
-
-
-def test_poses_of_another_length_than_the_pixels_are_refused():
-    poses, uv = poses_of(), np.full((N + 1, 2), 300.0)
-    e = PoseErrors(np.eye(2), np.eye(6), np.eye(3), 1.0)
-    for call in (
-        lambda: georeference_pixels(poses, uv, 0.0),
-        lambda: ground_jacobians(poses, uv, 0.0),
-        lambda: ray_flatness(poses, uv, e),
-        lambda: ground_covariance(poses, uv, 0.0, e, np.random.default_rng(0)),
-        lambda: calibrate(lambda _: poses, uv, np.zeros((N + 1, 3)), np.arange(N + 1)),
-    ):
-        with pytest.raises(WildlabError, match=r"^uv: 5 rows for poses with 4 rows"):
-            call()
-    with pytest.raises(WildlabError, match=r"^plane_down: "):
-        georeference_pixels(poses, uv[:N], np.zeros(N + 1))
-    with pytest.raises(WildlabError, match=r"^uv: "):
-        georeference_pixels(poses, np.zeros((N, 3)), 0.0)
 
 
 def test_a_pose_of_the_lens_itself():

@@ -1,11 +1,9 @@
 """Outlines of what an image shows of the ground, beside brute force."""
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera, in_image
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix
@@ -44,12 +42,3 @@ def test_the_outline_holds_what_the_image_shows_of_even_ground(roll, pitch, yaw)
     np.testing.assert_allclose(np.hypot(*(found.points[found.cut] - [5.0, -7.0]).T), furthest)
     # A chord in place of an arc, and borders between rays, may be wrong by a little.
     assert (inside(found.points, points) != shown).sum() < 0.03 * shown.sum() + 20
-
-
-def test_an_outline_needs_one_pose_and_rays():
-    flat = Terrain(np.zeros((3, 3), np.float32), -2000.0, -2000.0, 2000.0)
-    two = CameraPoses(CAMERA, Mount("down"), np.zeros((2, 3)), np.eye(3))
-    with pytest.raises(WildlabError, match="Give one pose"):
-        footprint(flat, two)
-    with pytest.raises(WildlabError, match="0 rays"):
-        footprint(flat, two.take(0), per_side=0)

@@ -10,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix
@@ -158,25 +157,6 @@ def test_heights_and_slopes_are_those_of_the_surface():
         terrain, np.tile([0.0, 0.0, 1.0], (len(at), 1)), np.c_[at, np.full(len(at), -99.0)]
     )
     np.testing.assert_allclose(-met.points[:, 2], terrain.heights_at(at), atol=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "says"),
-    [
-        ((np.zeros(4), 0, 0, 1.0), "shape"),
-        ((np.zeros((1, 5)), 0, 0, 1.0), "two rows"),
-        ((np.zeros((3, 3)), 0, 0, 0.0), "step of 0.0"),
-        ((np.full((3, 3), np.nan), 0, 0, 1.0), "no height"),
-    ],
-)
-def test_a_terrain_that_is_none_is_refused(arguments, says):
-    with pytest.raises(WildlabError, match=says):
-        Terrain(*arguments)
-
-
-def test_starts_have_to_go_with_rays():
-    with pytest.raises(WildlabError, match="one start"):
-        intersect_terrain(Terrain(np.zeros((3, 3)), 0, 0, 1.0), np.ones((3, 3)), np.zeros((2, 3)))
 
 
 @pytest.mark.parametrize("slope", [(0.2, 0.0), (0.0, -0.2), (0.1, 0.1)])

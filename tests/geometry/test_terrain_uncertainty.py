@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.covariances import inside_ellipse
@@ -153,29 +152,6 @@ def test_ellipses_hold_nine_tenths_of_samples_on_slopes(rough, flattest):
     assert 0.89 <= np.mean(inside) <= 0.91
 
 
-def ridge(height: float = 12.0) -> Terrain:
-    """Level ground with a wall across, from 100 to 104 m north."""
-    north = np.arange(-200.0, 800.0, 2.0)
-    wall = np.where((north >= 100) & (north <= 104), height, 0.0)
-    return Terrain(np.tile(wall[:, None], (1, 500)).astype(np.float32), -200.0, -500.0, 2.0)
-
-
-def test_over_a_ridge_samples_decide_and_it_is_said():
-    """A ray that just clears the wall: some of its like end on it, some far behind."""
-    level = Mount("down", tilt=np.radians(60.0))
-    e, uv = errors(0.3, 0.3), np.array([[320.0, 256.0]])
-    poses = CameraPoses(CAMERA, level, np.array([4.0, 0.0, -70.5]), np.eye(3))
-    at = pixels_to_terrain(poses, uv, ridge()).points[0]
-    assert 125 < at[0] < 128 and at[2] == 0.0  # behind the wall, by little
-    found = terrain_covariance(poses, uv, ridge(), e, np.random.default_rng(0))
-    assert found.method[0] == "split"
-    others = sample_terrain(poses, uv[0], ridge(), e, np.random.default_rng(5), 4000)
-    assert 0.85 <= inside_ellipse(others[:, :2] - at[:2], found.covariance[0]).mean() <= 0.95
-    clear = terrain_covariance(replace(poses, p_nb=np.array([60.0, 0.0, -70.5])), uv, ridge(), e,
-                               np.random.default_rng(0))  # fmt: skip
-    assert clear.method[0] == "linear"
-
-
 def test_beyond_the_map_there_is_no_ellipse():
     """A hill's top before the sky, the end of the map before nothing: no ellipse pretends to know."""
     e, uv = errors(), np.array([[320.0, 256.0], [320.0, 256.0], [320.0, 256.0]])
@@ -185,9 +161,3 @@ def test_beyond_the_map_there_is_no_ellipse():
                                np.random.default_rng(0))  # fmt: skip
     assert list(found.method) == ["unbounded", "none", "none"]
     assert np.isnan(found.covariance).all()
-
-
-def test_errors_of_another_number_are_refused():
-    e = errors()._replace(plane=np.ones(3))
-    with pytest.raises(WildlabError, match="2 pixels"):
-        terrain_covariance(looking(60.0, 50.0), np.ones((2, 2)), sloping(0, 0), e, np.random.default_rng(0))

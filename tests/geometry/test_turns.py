@@ -40,14 +40,6 @@ def test_small_turns_keep_their_digits(angle, share):
     assert np.abs(turned - [share * angle, 0.0, 0.0]).max() < 8 * np.finfo(float).eps
 
 
-def test_an_even_turn_about_one_axis_has_a_closed_form():
-    begin, end = 0.2, 2.9
-    q = np.array([[np.cos(a / 2), 0.0, 0.0, np.sin(a / 2)] for a in (begin, end)])
-    share = np.linspace(0, 1, 11)
-    R = between_attitudes(q, np.zeros(11, int), np.ones(11, int), share)
-    assert np.allclose(np.arctan2(R[:, 1, 0], R[:, 0, 0]), begin + share * (end - begin), atol=1e-14)
-
-
 def test_a_quaternion_and_its_negative_are_the_same_attitude():
     q, (before, after, share) = attitudes(30, 5), some_rows(30, 5)
     turned = q * np.where(np.arange(30) % 2, -1.0, 1.0)[:, None]

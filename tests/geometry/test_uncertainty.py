@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera, normalise
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.covariances import ellipse_axes, inside_ellipse
@@ -118,17 +117,6 @@ def test_samples_scatter_about_the_point_as_the_derivatives_say():
     C = stated.covariance[0]
     assert np.abs(np.cov(draws.T) - C).max() < 0.03 * np.abs(C).max()
     assert np.allclose(draws.mean(axis=0), georeference_pixels(pose, uv, 1.0)[:2], atol=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("field", "wrong"),
-    [("pixel", np.tile(np.eye(2), (3, 1, 1))), ("pose", np.zeros((5, 6, 6))), ("plane", np.ones(3))],
-)
-def test_errors_of_another_length_than_the_pixels_are_refused(field, wrong):
-    poses = CameraPoses(TAU2, Mount(), np.tile([0.0, 0, -90], (4, 1)), np.eye(3))
-    e = errors(1.0)._replace(**{field: wrong})
-    with pytest.raises(WildlabError, match=f"^{field}: .* 4 pixels"):
-        ground_covariance(poses, np.full((4, 2), 300.0), 0.0, e, np.random.default_rng(0))
 
 
 @pytest.mark.parametrize("pitch_deg", [-90, -40, -25, -20, -15])

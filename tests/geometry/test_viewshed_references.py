@@ -47,6 +47,7 @@ def test_the_exact_line_of_sight_is_that_of_grass(references):
         assert (clear == grass)[grass == gdal].mean() >= 0.995, name
 
 
+@pytest.mark.slow
 def test_the_thesis_is_further_from_grass_than_the_exact_one(references):
     """Its Bresenham takes the nearest grid points, and its rays have steps: neither is hidden here."""
     for name, (terrain, nodes, camera, above, grass, _) in references.items():

@@ -88,9 +88,3 @@ def test_a_lens_that_folds_back_shows_nothing_behind_its_edge():
     assert len(at) > 100 and np.hypot(*(at * 4.0 - 400.0).T).max() < 60
     behind = ground_to_pixel(folds, [[80.0, 0.0, 0.0]], pose.p_nc, pose.R_nc)
     assert in_image(folds, behind).all(), "the polynomial alone would show it"
-
-
-def test_one_image_at_a_time():
-    two = CameraPoses(CAMERA, Mount("down"), np.zeros((2, 3)), np.eye(3))
-    with pytest.raises(WildlabError, match="Give one pose"):
-        visible_nodes(rough(1), two)

@@ -17,7 +17,7 @@ from wildlab.geometry.frames import rotation_vector_to_matrix
 from wildlab.geometry.gravity import flat_earth, local_earth
 from wildlab.navigation.aiding import GaussMarkov, positions, velocities
 from wildlab.navigation.mekf import Outages, prepare, run_mekf
-from wildlab.navigation.noise import AxisErrors, ImuNoise, with_turn_on
+from wildlab.navigation.noise import AxisErrors
 from wildlab.navigation.strapdown import ImuSamples
 from wildlab.simulation.error_models import gauss_markov
 from wildlab.simulation.imu import misaligned_triad
@@ -135,13 +135,3 @@ def test_axis_errors_have_the_covariance_of_misaligned_triads():
     stated = AxisErrors(package / np.sqrt(3), lean / np.sqrt(3)).covariance()
     assert np.abs(np.cov(triads.T) - stated).max() < 0.03 * stated.max()
     assert AxisErrors(0.0, 0.0, 0.01).covariance()[4, 4] == pytest.approx(1e-4)
-
-
-def test_a_constant_and_a_process_are_one_process():
-    """With the variance of both, driven as the second is."""
-    noise = with_turn_on(ImuNoise(0.1, 0.2, 0.003, 300.0, 1e-5, np.inf), 0.04, 0.5)
-    assert noise.accelerometer_bias_sd == pytest.approx(np.hypot(0.003, 0.04))
-    drive = noise.accelerometer_bias_sd**2 * 2 / noise.accelerometer_bias_time
-    assert drive == pytest.approx(0.003**2 * 2 / 300)
-    assert noise[4:] == (1e-5, np.inf)  # a random walk forgets where it began: the start says what is known
-    assert with_turn_on(noise, 0.0, 0.0) == pytest.approx(noise)

@@ -17,7 +17,6 @@ from tests.navigation.flights import (
     moved,
     spoil,
 )  # fmt: skip
-from wildlab.errors import WildlabError
 from wildlab.geometry.frames import matrix_to_rotation_vector, quaternion_to_matrix
 from wildlab.geometry.gravity import flat_earth, local_earth
 from wildlab.navigation import kernels
@@ -256,32 +255,6 @@ def test_wanted_times_may_repeat_lie_outside_or_be_unknown(flight):
     assert pose_covariance(found.covariance).shape == (6, 6, 6)
     alone = run_mekf(imu, start, NOISE, EARTH, antennas, [10.0])
     assert np.allclose(alone.position[0], found.position[2], atol=1e-12)
-
-
-def test_measurements_outside_the_estimate_are_counted(flight):
-    imu, start, antennas, _ = spoilt(flight, 13)
-    early = antennas[0]._replace(times=antennas[0].times - 100.0)
-    found = run_mekf(imu, start, NOISE, EARTH, [early, antennas[1]], [50.0])
-    assert found.unused == [int((early.times < 0).sum()), 0]
-
-
-@pytest.mark.parametrize(
-    ("make", "about"),
-    [
-        (lambda: positions([1.0, 2.0], np.zeros((3, 3)), 1.0), "do not go"),
-        (lambda: positions([1.0], np.zeros((1, 3)), 0.0), "standard deviation"),
-        (lambda: velocities([1.0], np.zeros((1, 3)), np.nan), "standard deviation"),
-    ],
-)
-def test_what_is_no_measurement_is_refused(make, about):
-    with pytest.raises(WildlabError, match=about):
-        make()
-
-
-def test_a_start_on_another_clock_is_refused(flight):
-    start = InitialState(1.4e9, np.zeros(16), np.eye(15))
-    with pytest.raises(WildlabError, match="clock"):
-        run_mekf(flight.imu, start, NOISE, EARTH, [])
 
 
 PHASES = {"straight": (60, 90), "turn": (90, 130), "outage": (200, 260), "recovered": (262, 330)}

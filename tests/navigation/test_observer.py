@@ -5,7 +5,6 @@ import pytest
 
 from tests.navigation import reference_observer
 from tests.navigation.flights import LEVERS, NOISE, attitude, begin, fixes, fly, moved, spoil
-from wildlab.errors import WildlabError
 from wildlab.geometry.frames import (
     geodetic_to_ecef,
     matrix_to_euler,
@@ -138,15 +137,3 @@ def test_one_antenna_with_a_magnetometer_or_a_course(flight):
         found = run_observer(imu, start, ORIGIN, [antennas[0], velocity, second], flight.imu.times[rows])
         off = matrix_to_euler(quaternion_to_matrix(found.quaternion))[:, 2] - yaw
         assert np.degrees(np.sqrt((np.angle(np.exp(1j * off)) ** 2).mean())) < 3.0
-
-
-def test_slow_courses_and_missing_directions_are_left_out():
-    v = np.array([[10.0, 0, 0], [1.0, 0, 0], [np.nan, 0, 0], [0, 20.0, 1]])
-    assert course_reference(np.arange(4.0), v, latency=0.2).times.tolist() == [-0.2, 2.8]
-    assert len(field_reference([1.0, 2.0], [[0, 0, 0], [1, 0, 0]], [1.0, 0, 0.0]).times) == 1
-
-
-def test_a_start_on_another_clock_is_refused(flight):
-    _, start, antennas, _, _ = spoilt(flight, 4)
-    with pytest.raises(WildlabError, match="clock"):
-        run_observer(flight.imu, start._replace(time=-5.0), ORIGIN, antennas)

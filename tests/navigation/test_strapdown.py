@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from wildlab.errors import WildlabError
 from wildlab.geometry.frames import matrix_to_quaternion, quaternion_to_matrix
 from wildlab.geometry.gravity import EARTH_RATE, flat_earth, local_earth, normal_gravity
 from wildlab.navigation.strapdown import ImuSamples, integrate_strapdown
@@ -117,27 +116,6 @@ def test_the_plumb_line_leans_with_the_distance():
     )
     # The Coriolis force on the fall itself has no northward part to first order.
     assert found.velocity[-1, 0] == pytest.approx(-earth.gravity * 1000 / 6371e3, rel=0.02)
-
-
-@pytest.mark.parametrize(
-    ("spoil", "about"),
-    [
-        (lambda t, f, w: (t[::-1], f, w), "forward in time"),
-        (lambda t, f, w: (t, f[:, :2], w), "shapes"),
-        (lambda t, f, w: (t, f * np.nan, w), "only 0"),
-        (lambda t, f, w: (np.repeat(t[::2], 2), f, w), "repeated"),
-    ],
-)
-def test_what_is_no_series_of_samples_is_refused(spoil, about):
-    times = np.arange(0, 1, 0.01)
-    imu = ImuSamples(*spoil(times, np.ones((100, 3)), np.ones((100, 3))))
-    with pytest.raises(WildlabError, match=about):
-        integrate_strapdown(imu, np.zeros(3), np.zeros(3), [1, 0, 0, 0], flat_earth())
-
-
-def test_a_latitude_in_degrees_is_refused():
-    with pytest.raises(WildlabError, match="radians"):
-        local_earth(63.6)
 
 
 def test_rows_with_nan_are_missing_samples():
