@@ -31,6 +31,7 @@ def folder(tmp_path_factory):
     return into
 
 
+@pytest.mark.slow
 def test_what_is_learnt_is_written_and_of_one_camera_alone(folder, tmp_path):
     succeed("calibrate", folder / "tilted", "--out", tmp_path / "c.toml")
     kept = read_learnt(tmp_path / "c.toml")
@@ -59,10 +60,11 @@ def test_causes_that_are_inseparable_are_named(folder, tmp_path, monkeypatch):
     rival = SimpleNamespace(causes=("boresight",), gain=SimpleNamespace(with_=2.1, counts=True))
     for rivals in ((rival,), ()):
         learn(monkeypatch, winner=winner, rivals=rivals, models=[winner, *rivals])
-        out = succeed("calibrate", folder / "tilted", "--out", tmp_path / "c.toml")
+        out = succeed("calibrate", folder / "short", "--out", tmp_path / "c.toml")
         assert ("boresight" in out) == bool(rivals)
 
 
+@pytest.mark.slow
 def test_logs_that_contradict_each_other_teach_nothing(folder, tmp_path):
     flight = load_flight(folder / "tilted")
     nav = flight.nav["logged"]

@@ -8,7 +8,6 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 import pytest
 from bs4 import BeautifulSoup
@@ -16,7 +15,7 @@ from bs4 import BeautifulSoup
 from tests.commands import refuse, succeed
 from tests.sharing.left import leave_report
 from wildlab.flight.store import save_flight
-from wildlab.reporting.comparison import QUANTITIES, flights_table
+from wildlab.reporting.comparison import QUANTITIES
 from wildlab.reporting.metrics import metric
 from wildlab.runner.record.front_page import build_ledger
 from wildlab.runner.record.own_flights import own_flights
@@ -77,26 +76,6 @@ def test_the_page_and_the_table_have_every_flight(reports):
     for quantity in QUANTITIES:
         known = table[quantity.key].notna()
         assert (table[f"{quantity.key}_why"].isna() == known).all(), quantity.key
-
-
-def test_one_of_several_tracks_does_not_stand_for_all(reports):
-    leave(reports, "monday", "-tracking", numbers={("rmse", f"radar/{one}/ekf"): 4.0 for one in "ab"})
-    leave(reports, "tuesday", "-tracking", numbers={("rmse", "radar/a/ekf"): 4.0})
-    table = flights_table(own_flights(reports, ())).set_index("flight")
-    assert table.loc["tuesday", "track_rmse_m"] == 4.0
-    assert np.isnan(table.loc["monday", "track_rmse_m"])
-
-
-def test_a_crash_is_not_sound_and_the_attitude_is_that_of_the_page(tmp_path):
-    """Of the receiver's noise as found, where the page on the navigation speaks of it."""
-    crash = counts(0, 0, 0, 1) | {("broken", "flight"): 1}
-    leave(tmp_path, "monday", numbers=crash)
-    leave(tmp_path, "tuesday", numbers=counts(0, 0, 0, 1))
-    yaws = {("rms_yaw", "mekf"): 12.1, ("rms_yaw", "mekf-receiver"): 6.8}
-    leave(tmp_path, "tuesday", "-navigation", numbers=yaws)
-    table = flights_table(own_flights(tmp_path, ())).set_index("flight")
-    assert table.loc["monday", "verdict"] == "went wrong" and table.loc["tuesday", "verdict"] == "sound"
-    assert table.loc["tuesday", "yaw_deg"] == 6.8
 
 
 def test_into_another_folder_has_no_links_that_lead_nowhere(reports, tmp_path):

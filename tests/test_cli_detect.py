@@ -16,7 +16,6 @@ from PIL import Image
 from tests.analysis.test_detect import folder, picture
 from tests.commands import call, refuse, succeed
 from tests.test_cli_camera import huge_png
-from wildlab.analysis.detecting.command import too_few_or_many
 from wildlab.flight.store import save_flight
 from wildlab.simulation.twins import simulate_twin
 
@@ -44,11 +43,6 @@ def test_results_go_neither_among_the_images_nor_over_those_of_others(tmp_path):
     assert str(tmp_path) not in (tmp_path / "out" / "result.json").read_text(encoding="utf-8")
     assert "another folder" in refuse("detect", other, "--out", tmp_path / "out")
     assert (tmp_path / "out" / "detections.csv").read_bytes() == before
-
-
-def test_many_is_by_the_image():
-    few, many = (too_few_or_many("warm", "unknown", n, 5, chosen=False) for n in (50, 51))
-    assert few == [] and len(many) == 1
 
 
 def test_what_was_missed_and_invented_is_on_sheets(tmp_path):
@@ -89,15 +83,6 @@ def test_a_flight_gives_its_images_and_their_times(tmp_path):
     assert str(frame["frame_id"]) == name
     time = frame["time_s"]
     assert time == pytest.approx(twin.frames["time_s"].iloc[3] + twin.manifest.clocks.camera_offset_s)
-
-
-def test_wrong_use_is_refused(tmp_path):
-    path, into = folder(tmp_path / "in"), ("--out", tmp_path / "out")
-    labels = path / "labels.csv"
-    assert "no such file" in refuse("detect", tmp_path / "none", *into)
-    assert "--thresholds" in refuse("detect", path, *into, "--fit", labels, "--thresholds", labels)
-    assert "no labels" in refuse("detect", path, *into, "--class", "deer")
-    refuse("detect", tmp_path, *into)
 
 
 def test_a_turn_that_viewers_make_is_not_made(tmp_path):
@@ -162,16 +147,6 @@ def test_whatever_lies_in_the_folder_is_counted(tmp_path):
     assert code == 0 and len(lines) == 11 and "\x1b" not in err and f"{len(names) - 10} more" in lines[-1]
 
 
-def test_names_that_become_one_file_name_keep_a_picture_each(tmp_path):
-    path = folder(tmp_path / "in", 2)
-    for name in ("鹿.png", "猫.png", "000.jpg"):
-        cv2.imwrite(str(path / "x.png"), picture([(40, 40)], len(name)))
-        (path / "x.png").rename(path / name)
-    succeed("detect", path, "--out", tmp_path / "out")
-    found = sorted(one.name for one in (tmp_path / "out" / "overlays").glob("*.jpg"))
-    assert found == ["000-2.jpg", "000.jpg", "001.jpg", "_-2.jpg", "_.jpg"]
-
-
 @pytest.mark.slow
 def test_control_c_in_the_middle_loses_nothing_that_was_finished(tmp_path):
     path = folder(tmp_path / "in", 150)
@@ -201,24 +176,3 @@ def test_control_c_in_the_middle_loses_nothing_that_was_finished(tmp_path):
     subprocess.run(command("whole"), capture_output=True, check=True)
     at_once, in_two = ((tmp_path / into / "detections.csv").read_bytes() for into in ("whole", "out"))
     assert at_once == in_two
-
-
-def test_what_the_camera_does_is_seen(tmp_path):
-    """A closed shutter, a dead pixel and dark corners."""
-    path = tmp_path / "in"
-    path.mkdir()
-    rng = np.random.default_rng(4)
-    ground = 25 * cv2.GaussianBlur(rng.normal(0, 1, (96, 600)), (0, 0), 5)
-    v, u = np.mgrid[-1:1:96j, -1:1:128j]
-    for number in range(12):
-        image = 7000 + 10 * ground[:, 35 * number : 35 * number + 128] - 30 * (u**2 + v**2)
-        if number == 5:
-            image = np.full((96, 128), 7300.0)
-        image = image + rng.normal(0, 1.5, image.shape)
-        image[20, 30] = 0
-        cv2.imwrite(str(path / f"{number:02d}.png"), image.astype(np.uint16))
-    code, out, err = call("detect", path, "--out", tmp_path / "out", "--even")
-    assert code == 0 and "05.png" in err and "11 frames of 12" in out
-    assert "masked: 1" in out and "darker" in out
-    out = succeed("detect", path / "00.png", "--out", tmp_path / "one", "--even")
-    assert "darker" not in out

@@ -11,7 +11,6 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 
-from tests.commands import refuse
 from wildlab.cli import wildlab
 from wildlab.commands.sharing import VARIABLE
 from wildlab.sharing import share as sharing
@@ -65,7 +64,3 @@ def test_no_option_takes_a_password(asked):
     """Others on the machine can read what is typed after a command."""
     result = CliRunner().invoke(wildlab, ["share", "reports/mine", "--password", "x"])
     assert result.exit_code == 2 and not asked
-
-
-def test_a_report_that_is_not_there_is_wrong_use(tmp_path):
-    assert "no such report" in refuse("share", tmp_path / "none")

@@ -72,17 +72,3 @@ def test_a_geojson_has_the_places(surveyed, tmp_path):
     assert [one["properties"]["detection_id"] for one in found] == list(points["detection_id"])
     assert "--overwrite" in refuse("georeference", folder, "--out", tmp_path / "p.csv")
     assert ".geojson" in refuse("georeference", folder, "--out", tmp_path / "p.shp")
-
-
-def test_wrong_use_leaves_the_flight_as_it_is(surveyed, tmp_path):
-    folder, dem = surveyed
-    before = (folder / "flight.toml").read_bytes()
-    for options, words in (
-        ([], "heights"),
-        (["--heights", "sea"], "'sea'"),
-        (["--heights", "5000"], "5000 m"),
-        (["--heights", "ellipsoid", "--sd", "-1"], "--sd: "),
-        (["--heights", "ellipsoid", "--cell", "2"], "corner"),
-    ):
-        assert words in refuse("terrain", folder, dem, *options)
-    assert (folder / "flight.toml").read_bytes() == before and not (folder / "terrain.tif").exists()

@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from importlib import metadata
 from pathlib import Path
 
+import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
@@ -49,5 +50,6 @@ def complaints(root: Path, reasons: dict[str, str]) -> list[str]:
     return sorted(missing + stale + gone)
 
 
+@pytest.mark.slow
 def test_what_is_asked_for_is_used_or_has_a_reason():
     assert complaints(paths.ROOT, NOT_IMPORTED) == []

@@ -1,7 +1,5 @@
 """Where things lie, in a checkout and without one. `test_wheel.py` looks at a real installation."""
 
-from pathlib import Path
-
 from wildlab import paths
 from wildlab.flight import catalog
 
@@ -14,13 +12,6 @@ def test_a_checkout_is_known_by_what_lies_beside_the_package(tmp_path):
     assert paths.find_checkout(package) is None
     (tmp_path / "pyproject.toml").touch()
     assert paths.find_checkout(package) == tmp_path
-
-
-def test_here_all_is_in_the_checkout():
-    assert Path(__file__).resolve().parents[1] == paths.ROOT
-    assert (paths.NOTEBOOKS, paths.DATA) == (paths.ROOT / "notebooks", paths.ROOT / "data")
-    assert (paths.REPORTS, paths.fetched()) == (paths.ROOT / "reports", paths.ROOT / "data" / "fetched")
-    assert paths.LOCK.is_file()
 
 
 def test_public_data_of_an_installed_wildlab_go_to_the_cache(tmp_path, monkeypatch):

@@ -6,7 +6,6 @@ import ast
 import base64
 import importlib
 import json
-import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -22,7 +21,6 @@ from wildlab.paths import NOTEBOOKS, ROOT
 from wildlab.reporting import new_figure, with_alt
 from wildlab.reporting.figures import FULL_SIZE, WIDTH
 from wildlab.reporting.notebook_pages import tutorial_page
-from wildlab.reporting.text import maths
 from wildlab.runner import tutorials
 
 TUTORIALS = tutorials.tutorial_notebooks()
@@ -73,12 +71,6 @@ def _allowed(module: str, name: str = "") -> bool:
     return name in offered if offered is not None and len(rest) < 2 else not name.startswith("_")
 
 
-def test_there_are_tutorials_and_they_are_numbered():
-    assert TUTORIALS
-    numbers = [int(path.stem.partition("-")[0]) for path in TUTORIALS]
-    assert numbers == list(range(1, len(TUTORIALS) + 1))
-
-
 @pytest.mark.parametrize("notebook", TUTORIALS, ids=lambda path: path.stem)
 def test_how_a_tutorial_is_written(notebook):
     code = list(cells(notebook, "code"))
@@ -87,14 +79,6 @@ def test_how_a_tutorial_is_written(notebook):
     assert [name for source in code for name in strange_imports(source)] == []
     assert any("with_alt(" in source for source in code), "no picture"
     assert tutorials.title_of(notebook) != notebook.stem
-
-
-@pytest.mark.parametrize("notebook", TUTORIALS, ids=lambda path: path.stem)
-def test_its_formulas_can_be_translated(notebook):
-    text = "\n\n".join(cells(notebook, "markdown"))
-    formulas = re.findall(r"\$\$(.+?)\$\$|\$([^$\n]+?)\$", text, re.DOTALL)
-    for block, within in formulas:
-        assert maths(block or within, block=bool(block)).count("<math") == 1
 
 
 # -- the page
@@ -117,6 +101,7 @@ def picture(alt: str = "A line.") -> dict[str, Any]:
     }
 
 
+@pytest.mark.slow
 def test_a_page_shows_code_prints_values_and_pictures(tmp_path, faults):
     table = "<style scoped>td { color: red }</style><table border='1'><tr><td>7</td></tr></table>"
     node = executed(
@@ -168,16 +153,6 @@ def small(folder: Path, **tutorial: str) -> Path:
         )
         write(folder / "notebooks" / "tutorials", f"{name}.ipynb", node)
     return folder / "notebooks"
-
-
-def test_links_are_to_pages_that_are_there(tmp_path):
-    notebooks = small(tmp_path, b="1", a="2")
-    assert tutorials.tutorial_links(tmp_path, notebooks) == []
-    (tmp_path / "tutorials").mkdir()
-    (tmp_path / "tutorials" / "b.html").write_text("")
-    assert tutorials.tutorial_links(tmp_path, notebooks) == [("A title", "tutorials/b.html")]
-    with pytest.raises(WildlabError, match="there are no tutorials"):
-        tutorials.run_tutorials(tmp_path, tmp_path / "elsewhere")
 
 
 @pytest.mark.slow
