@@ -64,21 +64,13 @@ def test_all_files_have_the_same_keys_and_placeholders():
         ("nb", length(6.42), "6,4 meter"),
         ("en", length(0.4), "40 cm"),
         ("sv", length(1234.0), "1,2 km"),
-        ("en", length(999.6), "1000 metres"),
-        ("en", number(1234567.0), "1,234,567"),
         ("nb", number(12345.0), "12\u00a0345"),
         ("en", duration(62.0), "62 seconds"),
         ("nb", duration(9000.0), "2,5 timer"),
         ("en", share(0.9999), "99%"),
-        ("en", share(0.001), "1%"),
-        ("nb", share(1.0), "100 %"),
-        ("en", share(0.0), "0%"),
-        ("en", share(1.34), "134%"),
-        ("en", Quantity("area", 3.4e5), "34 hectares"),
         ("en", Quantity("angle", 3.141592653589793), "180 degrees"),
         ("en", Quantity("number", -12.0), "−12"),
         ("en", Day(date(2026, 3, 14), True), "14 March 2026 (UTC)"),
-        ("nb", Day(date(2026, 3, 14), True), "14. mars 2026 (UTC)"),
         ("sv", Day(date(2026, 3, 14), False), "mars 2026 (UTC)"),
     ],
 )  # fmt: skip
@@ -129,10 +121,7 @@ def test_a_partner_adds_a_language(tmp_path):
     [
         ('[tile]\nnobody = "x"', "tile.nobody", "no text"),
         ('[alarm]\nleans = "It leans."', "alarm.leans", "placeholders"),
-        ('[alarm]\nleans = "{size} {where}"', "alarm.leans", "placeholders"),
         ('[alarm]\njumps = {one = "It jumps.", many = "{n} {size}"}', "alarm.jumps", "placeholders"),
-        ("[tile]\nseen = 3", "tile.seen", "int"),
-        ('[steps]\nsome = "{n}"', "steps.some", "how many"),
         ('[steps]\nsome = {one = "x", many = "y"}', "steps.some", "placeholders"),
         ('[format]\nmonths = ["x"]', "format.months", "12"),
         ('[tile]\nseen = "' + "x" * 401 + '"', "tile.seen", "401"),
@@ -149,17 +138,3 @@ def test_a_language_that_is_not_there():
     for code in ("xx", "../en/replay"):
         with pytest.raises(WildlabError, match="no language"):
             load_language(code)
-
-
-@pytest.mark.parametrize(
-    ("head", "problem"),
-    [
-        ('[language]\ncode = "no/way"\nname = "x"', "no/way"),
-        ('[language]\ncode = "sw"', "name"),
-    ],
-)
-def test_a_language_has_a_code_and_a_name(tmp_path, head, problem):
-    path = tmp_path / "x.toml"
-    path.write_text(head, encoding="utf-8")
-    with pytest.raises(WildlabError, match=problem):
-        load_language(path)

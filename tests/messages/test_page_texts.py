@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import math
 import re
-from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wildlab.errors import WildlabError
 from wildlab.messages.catalogue import FOLDER, fill, load_texts
 from wildlab.messages.quantities import measure, percent_of, significant
 
@@ -39,13 +37,6 @@ def test_what_is_not_known_is_nan_in_every_form():
     assert measure(math.nan, "m").startswith("nan")
 
 
-def test_a_subject_may_have_parts():
-    assert (
-        fill("{level/roll/400m/error}", {("error", "level/roll/400m"): {"value": 21, "unit": "m"}}, {})
-        == "21 m"
-    )
-
-
 def test_numbers_and_values_are_put_in_once():
     values = {"flights": "{ekf/mae}", "factor": 2.96, "share": 0.937, "n": 1234}
     assert fill("{ekf/mae:range}; {ekf/mae:count}", MAE, {}) == "9.8 m (5.1 to 16); 40"
@@ -57,16 +48,6 @@ def test_numbers_and_values_are_put_in_once():
 def test_a_number_that_was_never_recorded_is_a_fault(text):
     with pytest.raises(KeyError):
         fill(text, MAE, {})
-
-
-@pytest.mark.parametrize(
-    ("toml", "field"), [("answers = 1", "answers"), ("[figure.a]\nalt = 'a'\ntext = 'b'", None)]
-)
-def test_a_key_that_no_page_has_is_named(toml, field, tmp_path: Path):
-    (tmp_path / "one.toml").write_text(toml, encoding="utf-8")
-    with pytest.raises(WildlabError) as caught:
-        load_texts("one", tmp_path)
-    assert caught.value.field == field and "one.toml" in str(caught.value)
 
 
 @pytest.mark.parametrize("page", PAGES)

@@ -179,9 +179,6 @@ def test_terrain_becomes_triangles_that_lie_on_it():
 
 LACKING: dict[str, tuple[Callable[[Flight], Flight], str, str]] = {
     "images": (lambda f: without(f, "frames", "detections"), "images", "/world/flown/aircraft"),
-    "poses": (lambda f: replace(f, nav={}), "aircraft", "/world/camera/image/detections"),
-    "truth": (lambda f: without(f, "truth"), "truth", "/world/flown/aircraft"),
-    "detections": (lambda f: without(f, "detections"), "detections", "/world/footprint"),
     "camera": (
         lambda f: replace(f, manifest=f.manifest.model_copy(update={"camera": None})),
         "no camera",

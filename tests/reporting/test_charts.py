@@ -18,16 +18,14 @@ from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.geometry.frames import Array
 from wildlab.reporting.charts.following import beside_plain, beside_plain_shown, map_shown
 from wildlab.reporting.charts.navigation import (
-    bias_chart,
     error_bands,
-    speed_chart,
     squares_chart,
 )
 from wildlab.reporting.charts.overview import Clock, lines_chart
 from wildlab.reporting.charts.tracks import (
     speed_and_course,
 )
-from wildlab.reporting.figures import MOST_POINTS, png_bytes
+from wildlab.reporting.figures import png_bytes
 from wildlab.reporting.overview import way_of
 
 N = 200
@@ -134,18 +132,6 @@ def test_squares_have_the_band_of_chi_square():
     fig = squares_chart({"position": (TIMES, values)}, 3, "NIS", "NIS")
     edges = [line.get_ydata()[0] for line in fig.axes[0].lines if len(line.get_ydata()) == 2]
     assert sorted(edges) == pytest.approx(chi_square_interval(3))
-
-
-def test_units_of_biases_and_long_lines():
-    biases = np.tile([0.01, 0, 0, np.radians(1) / 3600, 0, 0], (301, 1))
-    forces, rates = bias_chart(TIMES, biases, 0.5 * biases, "Biases").axes
-    assert forces.lines[0].get_ydata()[0] == pytest.approx(10.0)  # mm/s^2
-    assert forces.collections[0].get_paths()[0].get_extents().y1 == pytest.approx(20.0)
-    assert rates.lines[0].get_ydata()[0] == pytest.approx(1.0)  # deg/h
-    many = np.linspace(0, 1, 10 * MOST_POINTS)
-    speed = speed_chart({"mekf": (many, np.tile([3.0, 4.0, 0.0], (len(many), 1)))}, "Speed")
-    shown = speed.axes[0].lines[0].get_ydata()
-    assert len(shown) <= MOST_POINTS and shown[0] == pytest.approx(5.0)
 
 
 SECONDS = np.arange(0.0, 20.0, 0.1)

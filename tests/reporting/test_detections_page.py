@@ -90,15 +90,12 @@ def test_names_are_names_and_nothing_more():
 ELLIPSES = {"estimate": 0.6, "low": 0.5, "high": 0.7}
 RUNS = [
     (run(judged=rates(6, 2, 3)), ["labels", "reason-judged", "advice-fit"]),
-    (run(judged=rates(6, 0, 0, interval=False)), ["labels", "reason-judged", "advice-few"]),
     (run(), ["not-judged", "reason-not-judged", "advice-label"]),
     (run(problems=[["a", "b"]]), ["not-judged", "reason-lost", "advice-label"]),
     (run(judged=rates(6, 0, 0), fit={"held_out": rates(5, 1, 1), "where_chosen": rates(6, 1, 1),
                                      "defaults": rates(2, 9, 7)}), ["held-out", "reason-judged"]),
     (run(judged=rates(6, 0, 0) | {"ellipse_coverage_90": ELLIPSES}),
      ["labels", "ellipses-small", "reason-judged"]),
-    (run(judged=rates(6, 0, 0) | {"ellipse_coverage_90": ELLIPSES | {"high": 0.95}}),
-     ["labels", "ellipses-open", "reason-judged"]),
     (run(judged=rates(6, 0, 0) | {"ellipse_coverage_90": ELLIPSES | {"low": 0.95, "high": 0.99}}),
      ["labels", "ellipses-large", "reason-judged"]),
 ]  # fmt: skip

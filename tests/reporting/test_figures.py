@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.figure import Figure
-from matplotlib.patches import Ellipse
 
 from tests.figure_text import overlapping
 from tests.reporting.test_html import contrast
@@ -126,13 +125,6 @@ def test_no_letters_lie_on_others_and_all_can_be_read_on_a_phone(name):
     assert overlapping(figure) == []
     # As wide as a phone, the smallest letters still have their pixels: nobody has to push it sideways.
     assert figure.get_size_inches()[0] * least_size(figure) <= PHONE_WIDTH
-
-
-def test_the_ellipse_of_errors_is_in_its_figure():
-    errors = np.array([[3.0, 0.0], [-3.0, 0.0], [0.0, 3.0], [0.0, -3.0]] * 5)
-    (ax,) = georeferencing.error_scatter(errors, "").axes
-    (ellipse,) = (one for one in ax.patches if isinstance(one, Ellipse))
-    assert ellipse.height / 2 < ax.get_ylim()[1] and ellipse.width / 2 < ax.get_xlim()[1]
 
 
 def test_the_look_out_finds_what_is_wrong():

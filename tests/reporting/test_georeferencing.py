@@ -18,7 +18,6 @@ from bs4 import BeautifulSoup
 from wildlab.analysis.georeference import georeference, observe
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
-from wildlab.messages.catalogue import load_texts
 from wildlab.reporting import georeferencing
 from wildlab.reporting.georeferencing import EXACT, truth_kinds
 from wildlab.reporting.georeferencing_tables import POINT_COLUMNS, point_links
@@ -139,13 +138,3 @@ def test_an_offset_of_the_camera_s_clock_is_parted_from_its_zone():
     # A zone is read from the hours of the flight, and no point is fitted.
     for said in (limits_with(0.0), limits_with(-45900.0), limits_with(0.4, "twin")):
         assert "limit-clock-fitted" not in said
-
-
-def test_limits_are_those_that_apply_and_five_at_most():
-    receiver = EXACT._replace(tracked=3, track_sd_m=1.5)
-    assert limits_with(truth=receiver)["limit-track"] == {"sd": "1.5 m"}
-    assert not {"limit-track", "limit-mark", "limit-wander", "limit-halves"} & set(limits_with())
-    every = limits_with(1.0, truth=receiver._replace(marked=1), certain=True, halves=True, lost=2)
-    assert len(every) == 5 and "limit-lost" in every and "limit-lost" not in limits_with(lost=21)
-    texts = load_texts("georeferencing").answers
-    assert {key for key in every | limits_with()} <= set(texts)

@@ -22,9 +22,7 @@ from wildlab.reporting.figures import QUICK, new_figure
 from wildlab.reporting.metrics import claim, document, metric, read_metrics, write_metrics
 from wildlab.reporting.report import Report, open_report
 from wildlab.reporting.text import (
-    MOST_BYTES,
     csv_link,
-    data_link,
     escape,
     inline,
     maths,
@@ -156,12 +154,6 @@ def test_no_cell_and_no_column_is_a_formula():
 @pytest.mark.parametrize("column", ["lat", "lon_deg", "Latitude", "longitude", "utm_zone", "ecef_x", "mgrs"])
 def test_where_on_earth_something_is_gets_into_no_link(column):
     assert csv_link(pd.DataFrame({"name": ["a"], column: [1.0]}), "a") == ""
-
-
-def test_what_is_empty_or_large_is_not_embedded():
-    assert csv_link(pd.DataFrame({"a": []}), "a") == ""
-    assert data_link(b"x" * MOST_BYTES, "text/csv", "a.csv", "w")
-    assert data_link(b"x" * (MOST_BYTES + 1), "text/csv", "a.csv", "w") == ""
 
 
 @given(st.text())

@@ -105,14 +105,6 @@ def test_how_many_times_errors_are_what_is_predicted():
     assert page.answer(unseen.assign(nis=75.0, dof=3.0), [])[0].values["times"] == "5.0"
 
 
-def test_tracks_that_differ_are_counted():
-    both = pd.concat([rows(), rows(target="other", nees=9.0, verdict="overconfident", rmse=1.0).iloc[1:]])
-    first = page.answer(both, [])[0]
-    assert first.key == "errors-mixed" and first.values["judged"] == "2"
-    assert [first.values[one] for one in ("n", "consistent", "overconfident")] == ["2", "1", "1"]
-    assert page.reason(both).values["counts"] == "1 consistent, 1 overconfident"
-
-
 def test_what_could_not_be_judged_is_in_no_number_and_makes_nothing_sound():
     """One track that is consistent, and nine that are far off and were not judged."""
     others = [rows(target=f"t{k}", rmse=40.0, nees=30.0, verdict="not judged").iloc[1:] for k in range(9)]

@@ -49,12 +49,6 @@ def test_a_study_by_hand_imports_all_flights_of_its_data_set(made):
     assert {dataset for dataset, _, _ in made} == {"autoferry"}
 
 
-def test_without_its_data_set_it_says_how_to_get_it(monkeypatch):
-    monkeypatch.setattr("wildlab.flight.catalog.is_fetched", lambda name: False)
-    with pytest.raises(WildlabError, match="wildlab fetch openathena"):
-        flights.flight_for("survey-markers", "", 1)
-
-
 OF_FLIGHTS = {
     "repeat-sightings.ipynb": "gating",
     "overview.ipynb": "large-ship",

@@ -116,8 +116,6 @@ class Studies:
         self.ledgers: list[str] = []
         #: Break off (Ctrl-C) before this many jobs are done.
         self.stop_after = 99
-        #: Break off between a page that has come into place and the word that it has, of that many.
-        self.stop_before_telling = 99
         entries = []
         for name, few in (("slow", True), ("quick", False), ("other", True)):
             write(self.notebooks, f"{name}.ipynb", notebook(OPEN, more="runs = 1"))
@@ -142,8 +140,6 @@ class Studies:
             (self.reports / job.name / "metrics.json").write_text(
                 json.dumps(content | {"metrics": [], "claims": []})
             )
-            if sum(map(len, self.passes)) == self.stop_before_telling:
-                raise KeyboardInterrupt
             listen(job.name, "end", Outcome(job.name, "done", 1.0))
         return [Outcome(job.name, "done", 1.0, "look" if job.first_look else "whole") for job in given]
 
@@ -191,18 +187,14 @@ def test_the_ledger_is_there_before_anything_and_after_each_study(studies):
     assert "3 / 3</b>" in studies.ledger()
 
 
-@pytest.mark.parametrize(("stop_after", "done", "looks", "not_run"), [(1, 1, 0, 2), (4, 2, 1, 0)])
-def test_broken_off_anywhere_the_ledger_says_what_is_there(studies, stop_after, done, looks, not_run):
-    studies.stop_after = stop_after
+def test_broken_off_the_ledger_says_what_is_there(studies):
+    studies.stop_after = 4
     with pytest.raises(KeyboardInterrupt):
         studies.run(everything=True)
-    text = studies.ledger()
-    assert f"{done} / 3</b>" in text and text.count('class="look"') == looks
-    assert text.count("not run yet") == not_run
+    assert "2 / 3</b>" in studies.ledger() and studies.ledger().count('class="look"') == 1
     studies.stop_after = 99
     studies.passes.clear()
     studies.run(everything=True)
     assert "3 / 3</b>" in studies.ledger()
-    if stop_after == 4:
-        assert ("slow", LOOK) not in studies.passes[0], "its full numbers are there"
-        assert ("slow", {}) in studies.passes[1]
+    assert ("slow", LOOK) not in studies.passes[0], "its full numbers are there"
+    assert ("slow", {}) in studies.passes[1]

@@ -22,7 +22,7 @@ from wildlab.reporting import notebook_pages as html
 from wildlab.reporting.front_page import FILE, Glimpse, case_cards, front_page, load_front_flight
 from wildlab.reporting.published import published_rows
 from wildlab.reporting.published_tables import CALCULATIONS, count_answers
-from wildlab.reporting.status import StudyStatus, standing
+from wildlab.reporting.status import StudyStatus
 from wildlab.runner.catalogue import StudyEntry, load_studies
 from wildlab.runner.record.front_page import build_ledger
 from wildlab.runner.record.status import study_status
@@ -107,16 +107,6 @@ def test_counts_are_those_of_the_files(some, tmp_path):
     assert counts.all == found.all == 19 and counts.of == 0, "a calculation is in no headline"
     assert sorted(counts.others.values()) == [2, 5, 7]
     assert "14 of the 19" in BeautifulSoup(page_of(some), "html.parser").get_text(" ", strip=True)
-
-
-def test_cards_say_the_word_that_reports_say(some):
-    made = case_cards((one, Glimpse(sentence="A first sentence.")) for one in some if one.state != "not run")
-    done, _, failed, looked = made
-    expected = standing([n.compared for n in some[0].numbers if n.compared], [])
-    assert done.answers[0].word == expected.word and len(done.numbers) == 3
-    assert done.sentence == "A first sentence."
-    assert failed.answers[0].word == "failed" and failed.sentence == "It <b>broke</b>."
-    assert "&lt;b&gt;broke" in page_of(some) and "5 of 200" in looked.answers[0].note
 
 
 def test_the_caption_follows_from_the_arrays():

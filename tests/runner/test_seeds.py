@@ -14,12 +14,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wildlab.errors import RunFailed, WildlabError
+from wildlab.errors import RunFailed
 from wildlab.paths import NOTEBOOKS
 from wildlab.runner import open_study
 from wildlab.runner import seeds as fingerprint
 from wildlab.runner.open_study import trials_table
-from wildlab.runner.processes import cluster
 from wildlab.runner.processes.job import Job
 from wildlab.runner.processes.scheduling import _waiting
 from wildlab.runner.processes.worker_pool import answer
@@ -286,22 +285,6 @@ def test_a_notebook_opened_by_hand_computes_what_is_missing(tmp_path, capsys):
 def test_other_code_is_not_mixed_in():
     kind, content = answer("static-point", 1, {}, "another")
     assert kind == "failed" and "are not those that the run began with" in content[0]
-
-
-@pytest.mark.parametrize(
-    ("call", "sentence"),
-    [
-        (lambda: protocol.find_case("static-pont"), "there is no case 'static-pont'"),
-        (
-            lambda: make_work(Path(), "s", "slow-vessel", 1, 3, {"twin": "x"}),
-            "needs the parameter 'first'",
-        ),
-        (lambda: cluster.Cluster("tcp://127.0.0.1:1; ls"), "is no address of a scheduler"),
-    ],
-)
-def test_wrong_use_is_a_sentence(call, sentence):
-    with pytest.raises(WildlabError, match=sentence):
-        call()
 
 
 @pytest.mark.parametrize("changed", ["glossary.toml", "published/a.toml", "messages/en/a.toml"])

@@ -286,16 +286,6 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_numbers(tmp_path, cluster,
     assert numbers(folder, "cluster") == computed(12)
 
 
-def test_a_seed_that_fails_on_a_cluster_is_named(tmp_path, cluster):
-    folder = make(tmp_path, seeds=3)
-    cluster.add_worker()
-    cluster.wait_for_workers(1)
-    text = run(folder, "troubled", "once", "--scheduler", cluster.address)
-    assert "Seed 2 failed: The flight of seed 2 has no solution. Look at it." in text
-    assert "--scheduler has no effect on once" in text and "done  once" in text
-    assert len(kept(folder, "reports", "troubled")) == 1
-
-
 def test_a_scheduler_that_goes_away_is_a_sentence(tmp_path, cluster):
     folder = make(tmp_path, seconds=0.4, seeds=50)
     cluster.add_worker()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import math
-import struct
 from collections.abc import Callable
 from datetime import UTC, datetime
 from functools import cache
@@ -113,30 +112,16 @@ def _tile(latitude: float, longitude: float, zoom: int = 16) -> str:
     return f"{zoom}/{int(x)}/{int(y)}"
 
 
-def _bytes(latitude: float, longitude: float, order: str = "<ff") -> bytes:
-    return struct.pack(order, latitude, longitude)
-
-
 #: Spellings that the second wall does not know: they are of no form that a report has.
 CODED: dict[str, Callable[[float, float], str]] = {
     "a tile of a map": _tile,
-    "a tile, by letters": lambda a, b: "z16-x" + "-y".join(_tile(a, b).split("/")[1:]),
-    "base32": lambda a, b: base64.b32encode(f"{a:.4f} {b:.4f}".encode()).decode(),
     "base64": lambda a, b: base64.b64encode(f"{a:.4f} {b:.4f}".encode()).decode(),
-    "base85": lambda a, b: base64.b85encode(f"{a:.4f} {b:.4f}".encode()).decode(),
     "hexadecimal": lambda a, b: f"{a:.4f} {b:.4f}".encode().hex(),
-    "float32, hexadecimal": lambda a, b: _bytes(a, b).hex(),
-    "float32, base64": lambda a, b: base64.b64encode(_bytes(a, b)).decode(),
     "float64, hexadecimal": lambda a, b: f"{a.hex()} {b.hex()}",
-    "bits": lambda a, b: f"{int.from_bytes(_bytes(a, b), 'big'):b}",
-    "an integer of 64 bits": lambda a, b: str(int.from_bytes(_bytes(a, b), "big")),
     "fractions, as in EXIF": lambda a, b: " ".join(
         f"{x}/1 {y}/1 {round(float(z) * 100)}/100" for x, y, z in (sexagesimal(a, 2), sexagesimal(b, 2))
     ),
-    "Well-Known Binary": lambda a, b: struct.pack("<BIdd", 1, 1, b, a).hex(),
     "an encoded polyline": lambda a, b: "".join(_polyline(round(v * 1e5)) for v in (a, b)),
-    "JSON escapes": lambda a, b: "".join(f"\\u{ord(c):04x}" for c in f"{a:.4f} {b:.4f}"),
-    "percent": lambda a, b: "".join(f"%{ord(c):02X}" for c in f"{a:.4f} {b:.4f}"),
     "digits as words": lambda a, b: f"{round(a * 1e7)}x{round(b * 1e7)}",
 }  # fmt: skip
 

@@ -140,9 +140,7 @@ def test_a_zip_is_encrypted_and_lists_neutral_names(made):
     assert words not in copy.told.read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize(
-    "secret", ["-24.873165, 31.486297", "Thandi", "2023-09-17", HASH, "24°52'23.4\"S 31°29'10.7\"E"]
-)
+@pytest.mark.parametrize("secret", ["-24.873165, 31.486297", "Thandi", "2023-09-17"])
 def test_what_slips_through_is_found_and_no_copy_is_left(secret, made, monkeypatch):
     then(
         monkeypatch,

@@ -45,13 +45,6 @@ def test_a_part_that_failed_is_not_known_and_asked_for_again():
     assert story.advice == (Message("do.failed", {}, 2),) and story.why.key == "why.failed"
 
 
-def test_few_points_say_nothing_of_accuracy():
-    story = tell(WHOLE._replace(compared=9))
-    assert "measured.error" not in keys(story.measured) and "unknown.few" in keys(story.unknown)
-    assert all(label.key != "tile.error" for _, label in story.tiles)
-    assert "do.more_places" in keys(story.advice)
-
-
 def test_without_truth_sightings_are_held_against_each_other():
     story = tell(EMPTY._replace(verdict="sound", scatter=2.0, sightings=30, seen=40.0, placed=38.0))
     assert keys(story.measured) == ["measured.scatter", "measured.seen"]
