@@ -1,7 +1,5 @@
 """The centre of what the border cuts, H (4.7)."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -55,11 +53,3 @@ def test_what_is_whole_round_or_cut_otherwise_stays(centre, axes, angle, length,
     seen = detect_floating(image)
     assert len(seen) == 1, why
     assert np.array_equal(adjust_at_border(seen, image.shape, length).uv, seen.uv), why
-
-
-def test_of_a_broken_contour_the_axis_is_not_trusted():
-    image = ellipse_image()
-    seen = detect_floating(image)
-    line = replace(seen, area=0.3 * seen.area)
-    assert not np.array_equal(adjust_at_border(seen, image.shape, 124.0).uv, seen.uv)
-    assert np.array_equal(adjust_at_border(line, image.shape, 124.0).uv, seen.uv)

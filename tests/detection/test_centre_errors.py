@@ -26,19 +26,6 @@ CAMERA = Camera(640, 512, 1159.2, 1167.8, 313.0, 265.0)
 HONEST = (0.87, 0.93)
 
 
-def test_of_a_broken_outline_the_covariance_grows_and_a_floor_is_added():
-    region, boundary = np.diag([400.0, 25.0]), np.diag([30000.0, 3000.0])
-    filled, whole = 4 * np.pi * np.sqrt(400.0 * 25.0), np.zeros(4, bool)
-    full, broken = (
-        centre_covariance(area, region, boundary, whole, 1.1, CentreErrors())
-        for area in (filled, 0.3 * filled)
-    )
-    assert np.trace(broken) > 10 * np.trace(full)
-    assert np.array_equal(hidden_part(region, whole, CentreErrors()), np.zeros((2, 2)))
-    only_floor = centre_covariance(filled, region, boundary, whole, 1.1, CentreErrors(0.3, 0.0, 0.0))
-    assert np.allclose(only_floor, 0.09 * np.eye(2))
-
-
 def test_the_covariance_of_a_centre_worked_by_hand():
     """(edge blur)^2, of as many independent pieces as blurs go round, each with its lever over the area."""
     boundary, region, whole = np.diag([900.0, 100.0]), np.diag([4.0, 1.0]), np.zeros(4, bool)

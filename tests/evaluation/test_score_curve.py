@@ -9,7 +9,6 @@ from wildlab.errors import WildlabError
 from wildlab.evaluation.matching import (
     Rule,
     ScoredFrame,
-    average_precision,
     curve_along_score,
     difference_of_f1,
     match,
@@ -73,20 +72,6 @@ def test_scores_that_are_stretched_change_nothing_and_reversed_ones_do():
     turned = [one._replace(scores=-one.scores) for one in frames]
     areas = [curve_along_score(one).average_precision for one in (frames, same, turned)]
     assert areas[0] == areas[1] and areas[2].estimate < areas[0].low
-
-
-def test_nothing_found_nothing_labelled_and_no_score():
-    box, empty = np.array([[0.0, 0, 4, 4]]), np.zeros(0)
-    assert curve_along_score([ScoredFrame(NONE, empty, box, NONE)]).average_precision.estimate == 0
-    unlabelled = curve_along_score([ScoredFrame(box, np.ones(1), NONE, NONE)])
-    assert np.isnan(unlabelled.average_precision.estimate) and unlabelled.counts.tolist() == [[0, 1, 0]]
-    assert np.isnan(average_precision(np.zeros((0, 3))))
-    # What lies where nothing is judged is neither right nor wrong.
-    beside = np.array([[90.0, 0, 4, 4]])
-    ignored = curve_along_score([ScoredFrame(box, np.ones(1), beside, box)])
-    assert ignored.counts.tolist() == [[0, 0, 1]]
-    with pytest.raises(WildlabError, match="score"):
-        curve_along_score([ScoredFrame(box, np.array([np.nan]), box, NONE)])
 
 
 def test_a_difference_is_of_the_same_draws():

@@ -150,14 +150,3 @@ def test_ellipses_hold_nine_tenths_of_samples_on_slopes(rough, flattest):
     assert len(inside) > 60
     assert all(0.85 <= one <= 0.95 for one in inside), np.sort(inside)[[0, -1]]
     assert 0.89 <= np.mean(inside) <= 0.91
-
-
-def test_beyond_the_map_there_is_no_ellipse():
-    """A hill's top before the sky, the end of the map before nothing: no ellipse pretends to know."""
-    e, uv = errors(), np.array([[320.0, 256.0], [320.0, 256.0], [320.0, 256.0]])
-    mount = Mount("down", tilt=np.radians(75.0))
-    p = np.array([[0.0, 0.0, -95.0], [600.0, 0.0, -60.0], [0.0, 0.0, 10.0]])
-    found = terrain_covariance(CameraPoses(CAMERA, mount, p, np.eye(3)), uv, sloping(0.0, 0.0, 360.0), e,
-                               np.random.default_rng(0))  # fmt: skip
-    assert list(found.method) == ["unbounded", "none", "none"]
-    assert np.isnan(found.covariance).all()

@@ -42,8 +42,6 @@ def without(imu, begin_s, end_s):
     ("change", "about"),
     [
         (lambda imu, a: (imu._replace(specific_force=imu.specific_force / GRAVITY), a), "lost its way"),
-        (lambda imu, a: (imu._replace(angular_rate=np.degrees(imu.angular_rate)), a), "lost its way"),
-        (lambda imu, a: (imu._replace(specific_force=imu.specific_force * [1, -1, -1]), a), "lost its way"),
         (lambda imu, a: (imu._replace(angular_rate=imu.angular_rate * [1, -1, -1]), a), "lost its way"),
         (lambda imu, a: (imu._replace(angular_rate=imu.angular_rate[:, [1, 0, 2]]), a), "fit"),
         (lambda imu, a: (imu, [x._replace(times=x.times + 0.5) for x in a]), "lost its way"),

@@ -246,16 +246,6 @@ def test_the_payload_turns_against_the_airframe_slowly_by_about_a_degree(twin):
     assert np.abs(np.diff(turn, axis=1)).max() < fastest
 
 
-def test_leaving_tables_out_changes_no_other(short, sensed):
-    fewer = quick(short, 3)
-    assert fewer.imu is None
-    assert fewer.gnss is None
-    for name, table in every_table(fewer).items():
-        pd.testing.assert_frame_equal(table, every_table(sensed)[name], check_exact=True)
-    with pytest.raises(WildlabError, match="'frames'"):
-        simulate_twin("static-antenna", 3, without=["frames"])
-
-
 @pytest.mark.parametrize("seed", [-1, 2**63, 1.5, True, "1"])
 def test_a_seed_is_a_whole_number_from_zero(seed):
     with pytest.raises(WildlabError, match="not a seed"):

@@ -13,8 +13,6 @@ from wildlab.geometry.mount import R_MC_DOWN, Mount
 from wildlab.simulation.landscape import TREES_M, UNEVEN, grow_trees, synthetic_landscape
 from wildlab.simulation.scene import (
     EVEN_LAND,
-    GRASS,
-    SAND,
     Cover,
     Land,
     LandScene,

@@ -115,13 +115,6 @@ def test_what_is_farther_apart_than_a_ship_is_long_is_not_one():
     assert len(apart.z) == 2 and np.allclose(apart.kinds, 0.5)
 
 
-def test_what_no_gate_takes_is_of_a_ship_up_to_a_little_more_than_its_half():
-    """Within a length of each other both times: 17 m from the middle may be its bow, 20 m is beyond it."""
-    assert np.allclose(along(-5.0, 17.0, likely=0.0).z, [[6.0, 0.0]])
-    beyond = along(-5.0, 20.0, likely=0.0)
-    assert len(beyond.z) == 2 and np.allclose(beyond.kinds, 0.5)
-
-
 def test_bearings_of_one_hull_are_not_merged():
     """The mean of two on either side of south would be north."""
     z = np.array([[np.pi - 0.01], [0.01 - np.pi]])

@@ -67,25 +67,6 @@ def test_a_bearing_is_the_extended_kalman_filter(seed):
     assert compare_bearings(*given_, [[z + 1.0]], [[[R]]], 1e-3).likelihood[0, 0, 0] == 0
 
 
-def test_a_bearing_from_near_makes_no_track_too_sure():
-    """Places known to 5 m, bearings to 3 deg; to first order alone NEES / 2 would be 33 at 8 m."""
-    rng, distance = np.random.default_rng(5), 8.0
-    values = []
-    P = np.diag([25.0, 25.0, 1.0, 1.0])[None, None]
-    for _ in range(1000):
-        true = np.array([distance, 0.0, 0.0, 0.0])
-        x = (true + rng.normal(size=4) * np.sqrt(np.diag(P[0, 0])))[None, None]
-        z = rng.normal(0, np.radians(3.0))
-        compared = compare_bearings(
-            x, P, np.zeros((1, 1, 2, 2)), np.zeros(2), [[z]], [[[np.radians(3.0) ** 2]]], 1e9
-        )
-        taken = float(compared.likelihood[0, 0, 0] > 0)
-        after = update(x, P, [[1.0]], [[1 - taken, taken]], compared)
-        off = true[:2] - after.x[0, 0, :2]
-        values.append(off @ np.linalg.solve(after.P[0, 0, :2, :2], off) / 2)
-    assert np.mean(values) < 1.2
-
-
 @given(GENERATORS)
 def test_the_mixture_has_the_moments_of_its_parts(rng):
     """Each way alone by a Schmidt filter, weighed by Bayes' rule, summed: moments and kinds."""
@@ -273,18 +254,6 @@ def test_what_nobody_is_sure_of_tells_little():
     right = np.linalg.inv(np.eye(2) + information)
     assert np.allclose(covariance, right)
     assert np.allclose(mean, right @ (probable * 2.0 * np.linalg.solve(spread, middle)))
-
-
-def test_who_lies_far_off_by_what_is_shared_is_compared_too():
-    """A place known to a metre, and a look that is wrong by thirty: sixty is no reason to leave it out."""
-    known = looks(np.zeros((4, 1, 2)), np.random.default_rng(0))
-    off = look(4.0, [60.0, 0.0])
-    sure = EYE._replace(clutter=1e-9)
-    for shared, met in ((np.tile(30.0 * np.eye(2), (1, 1, 1)), True), (None, False)):
-        scans = [*known, off._replace(shared=shared)]
-        *_, last = follow_many(scans, [sure], POINTS, [0.0] * 2 if met else [])
-        hits = dict(zip(last[0].identity.tolist(), last[0].hits.tolist(), strict=True))
-        assert hits[0] == (5 if met else 4)
 
 
 def test_targets_that_are_moved_together_are_told_apart():

@@ -15,7 +15,6 @@ from wildlab.tracking.particles import (
     Cloud,
     draw,
     effective_size,
-    log_likelihood,
     moments,
     move,
     resample,
@@ -83,16 +82,6 @@ def test_a_start_has_its_mean_and_covariance(rng):
     error = np.sqrt((np.outer(sd**2, sd**2) + P**2) / N)
     assert (np.abs(covariance - P) <= 5 * error + 1e-12).all()
     assert not np.array_equal(cloud.x[0], cloud.x[1])
-
-
-def test_several_measurements_are_multiplied(rng):
-    x, z = rng.normal(0, 5, (2, 7, 2)), rng.normal(0, 5, (3, 2))
-    R = np.array([[4.0, 1.0], [1.0, 2.0]])
-    from scipy.stats import multivariate_normal
-
-    wanted = sum(multivariate_normal(one, R).logpdf(x) for one in z)
-    np.testing.assert_allclose(log_likelihood(x, z, R), wanted)
-    assert (log_likelihood(x, np.zeros((0, 2)), R) == 0).all()
 
 
 def test_a_footprint_is_read_at_the_nearest_node(rng):
