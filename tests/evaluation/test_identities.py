@@ -161,7 +161,7 @@ def test_dont_care_takes_no_part_in_swaps_breaks_and_anees_and_hidden_does():
 
 def test_anees_is_that_of_the_errors_and_leaves_out_unknown_covariances():
     rng = np.random.default_rng(3)
-    errors = rng.multivariate_normal([0, 0], [[4, 1], [1, 2]], 4000)
+    errors = rng.multivariate_normal([0, 0], [[4, 1], [1, 2]], 1000)
     P = np.array([[4.0, 1], [1, 2]])
     scans = [scan(t, {1: tuple(e)}, {"A": (0, 0)}) for t, e in enumerate(errors)]
     found = compare_identities([one._replace(covariances=P[None]) for one in scans], 100.0)

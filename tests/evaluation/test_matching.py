@@ -56,11 +56,11 @@ def test_shares_are_those_of_the_sums_and_clips_widen_the_intervals():
 def test_intervals_hold_what_they_should():
     rng = np.random.default_rng(3)
     held = 0
-    for _ in range(200):
+    for _ in range(100):
         found = rng.binomial(10, 0.7, 40)
         one = rates(np.stack([found, 0 * found, 10 - found], axis=1), seed=int(rng.integers(1e6))).recall
         held += one.low <= 0.7 <= one.high
-    assert 0.90 <= held / 200 <= 0.99
+    assert 0.90 <= held / 100 <= 0.99
 
 
 def test_what_has_not_gone_wrong_yet_may_still():

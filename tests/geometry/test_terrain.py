@@ -54,7 +54,7 @@ def slow_crossing(terrain: Terrain, start: np.ndarray, ray: np.ndarray) -> float
     return float("nan")
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(st.data())
 def test_rays_meet_the_patch_that_a_slow_walk_finds(data):
     shape = data.draw(st.tuples(st.integers(2, 19), st.integers(2, 19)))

@@ -22,7 +22,7 @@ def rough(seed, cells=24, high=6.0):
     return Terrain(rng.uniform(0, high, (cells, cells)).astype(np.float32), -23.0, -31.0, 2.0)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(st.integers(0, 10**6), st.sampled_from([0.4, 3.0, 30.0]), st.booleans())
 def test_a_line_is_clear_where_the_walk_from_the_camera_meets_nothing(seed, high, one):
     """The walk of rays goes the other way, works out crossings, and does not know what hid lines before."""

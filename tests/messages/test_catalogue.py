@@ -29,6 +29,7 @@ from wildlab.messages.catalogue import (
 )
 
 ENGLISH = EDITIONS / "en.toml"
+SWEDISH = load_language("sv")
 SPACE = "\u00a0"
 
 
@@ -83,7 +84,7 @@ def test_numbers_and_dates(code, said, shown):
 
 @given(st.floats(-1e9, 1e9), st.sampled_from(["length", "number", "area", "duration"]))
 def test_no_number_is_shown_with_a_minus_and_nothing(value, kind):
-    text = say(load_language("sv"), Quantity(kind, abs(value) if kind != "number" else value))
+    text = say(SWEDISH, Quantity(kind, abs(value) if kind != "number" else value))
     assert text.strip() and not text.startswith("−0 ") and text != "−0"
 
 

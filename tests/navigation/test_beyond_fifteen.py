@@ -131,7 +131,7 @@ def test_axis_errors_have_the_covariance_of_misaligned_triads():
     """Turned as a whole and leaning one by one, each evenly up to its limit: the simulated sensor's own."""
     rng = np.random.default_rng(15)
     package, lean = np.radians(0.25), np.radians(0.05)
-    triads = np.array([(misaligned_triad(lean, package, rng) - np.eye(3)).ravel() for _ in range(20_000)])
+    triads = np.array([(misaligned_triad(lean, package, rng) - np.eye(3)).ravel() for _ in range(10_000)])
     stated = AxisErrors(package / np.sqrt(3), lean / np.sqrt(3)).covariance()
     assert np.abs(np.cov(triads.T) - stated).max() < 0.03 * stated.max()
     assert AxisErrors(0.0, 0.0, 0.01).covariance()[4, 4] == pytest.approx(1e-4)

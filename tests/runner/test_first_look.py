@@ -124,6 +124,7 @@ class Studies:
             entries.append(f"[{name}.parameters]\nruns = 9\n" + f"[{name}.first_look]\nruns = 2\n" * few)
         (self.notebooks / "studies.toml").write_text("".join(entries))
         monkeypatch.setattr(running, "run_jobs", self.run_jobs)
+        monkeypatch.setattr(running, "code_key", lambda: "of the code")
 
     def ledger(self) -> str:
         return (self.reports / "ledger.html").read_text(encoding="utf-8")

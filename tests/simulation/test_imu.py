@@ -136,7 +136,7 @@ def test_the_turn_on_bias_is_drawn_once_per_flight():
 def test_misaligned_axes_stay_within_the_stated_angles(rng):
     axis, package = np.radians([0.05, 0.25])
     between, turned = [], []
-    for _ in range(3000):
+    for _ in range(1000):
         lean = misaligned_triad(axis, 0.0, rng)
         assert np.linalg.norm(lean, axis=1) == pytest.approx(1.0, abs=1e-12)
         between.append(lean[~np.eye(3, dtype=bool)])

@@ -221,9 +221,9 @@ def test_nobody_leaves_and_all_of_the_enclosure_is_used(rng):
     def half_disc(places):
         return (np.hypot(places[..., 0], places[..., 1]) < 50) & (places[..., 0] > 0)
 
-    tried = rng.uniform([0, -50], [50, 50], (60_000, 2))
-    tried = tried[half_disc(tried)][:20_000]
-    cloud = Cloud(tried[None], np.full((1, 20_000), 1 / 20_000))
+    tried = rng.uniform([0, -50], [50, 50], (24_000, 2))
+    tried = tried[half_disc(tried)][:8_000]
+    cloud = Cloud(tried[None], np.full((1, 8_000), 1 / 8_000))
     corner = Cloud(np.full_like(cloud.x, 1.0), cloud.w)
     for _ in range(400):
         cloud = stay_inside(cloud, move(cloud, walk_of(2.0, 1.0), 10.0, rng), half_disc)
