@@ -336,22 +336,3 @@ def test_a_breach_is_found(tmp_path, file, source, problem):
     found = violations(tmp_path)
     assert len(found) == 1, found
     assert problem in found[0]
-
-
-#: Modules that a public class name may be of. One would be right, and new classes keep to it.
-MOST_MEANINGS = 3
-
-
-def meanings(root: Path) -> dict[str, list[str]]:
-    """By the name of a public class the modules that define one of it."""
-    found: dict[str, list[str]] = {}
-    for path in sorted((root / "wildlab").rglob("*.py")):
-        for node in parsed(path).body:
-            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
-                found.setdefault(node.name, []).append(path.relative_to(root).as_posix())
-    return found
-
-
-@pytest.mark.slow
-def test_a_class_name_has_few_meanings():
-    assert {name: where for name, where in meanings(paths.ROOT).items() if len(where) > MOST_MEANINGS} == {}

@@ -76,8 +76,3 @@ def test_tracked_notebooks():
         if (faults := problems(json.loads(path.read_text(encoding="utf-8")), path.parent.name == "tutorials"))
     }
     assert not found
-
-
-def cell(source: str, **more: Any) -> dict[str, Any]:
-    bare: dict[str, Any] = {"cell_type": "code", "source": source, "metadata": {}}
-    return bare | {"outputs": [], "execution_count": None} | more

@@ -11,6 +11,7 @@ from wildlab.evaluation.consistency import (
     chi_square_interval,
     nees,
     nis,
+    position_nees,
     share_inside,
     simulate_filter_runs,
     whiten,
@@ -71,6 +72,14 @@ def test_the_truth_has_an_uncertainty_of_its_own():
     np.testing.assert_allclose(nees(e, P, np.zeros((2, 2))), nees(e, P))
     with pytest.raises(WildlabError, match="does not go"):
         nees(e, P, np.eye(4))
+
+
+def test_position_alone_is_the_marginal():
+    rng = np.random.default_rng(7)
+    root = rng.standard_normal((4, 4))
+    P, own = root @ root.T + np.eye(4), np.diag([2.0, 1.0])
+    e = rng.standard_normal((50, 4))
+    np.testing.assert_allclose(position_nees(e, P, own), nees(e[:, :2], P[:2, :2] + own))
 
 
 def test_whitened_errors_have_unit_covariance():

@@ -75,6 +75,12 @@ def test_a_threshold_may_say_what_is_counted():
         check.holds(7)
 
 
+def test_a_threshold_at_the_end_of_what_can_be_measured_alone_gives_the_answer():
+    for above, reaches in ((True, [True, True, False]), (False, [False, True, True])):
+        check = s.Check(measured=np.array([0.5]), above=above, reach=(0.0, 1.0))
+        assert [check.reaches(threshold) for threshold in (0.0, 0.5, 1.0)] == reaches
+
+
 def test_a_paired_difference_has_students_interval():
     rng = np.random.default_rng(1)
     first, second = rng.normal(5, 2, 30), rng.normal(4, 2, 30)

@@ -158,8 +158,6 @@ def one_track(nees: float) -> Any:
     [
         (followed(), lives(), SAID, "sound", "good", "sound"),
         (followed(), lives(targets=SHORT), ["one", "identities"], "short", "warn", "look closer"),
-        (followed(), lives(targets={"a": TargetLife(61, 0.9, 0.0, 0, 0)}), ["one", "identities"], "sound",
-         "good", "sound"),
         (followed(), lives(targets=NEVER), ["never", "identities"], "never", "bad", "targets lost"),
         (followed(), lives(targets={"a": NEVER["a"]}), ["never-any", "identities"], "never", "bad",
          "targets lost"),

@@ -72,7 +72,7 @@ def test_one_more_that_is_contradicted_or_open_never_betters_the_word(numbers, c
 FLIGHTS = pd.Series(np.random.default_rng(1).permutation(np.arange(200.0)))
 
 
-@pytest.mark.parametrize("n", [2, 18, 19, 200])
+@pytest.mark.parametrize("n", [18, 19, 200])
 def test_few_flights_have_a_range_and_many_the_prediction_interval_of_one_more(n):
     values, rank = FLIGHTS[:n], max((n + 1) // 20, 1)
     assert bounds_of(values) == (np.sort(values)[rank - 1], np.sort(values)[-rank])
@@ -85,7 +85,7 @@ def test_flights_on_a_printed_number_count_by_halves():
     assert np.isnan(share_below(values[:0], 1.0))
 
 
-@pytest.mark.parametrize("n", [1, 2, 18, 19, 99])
+@pytest.mark.parametrize("n", [1, 18, 19])
 def test_metrics_follow_the_number_of_flights(n):
     values = FLIGHTS[:n]
     spread = pd.DataFrame({("kf", "mae"): values})

@@ -305,7 +305,7 @@ def test_a_flight_with_labelled_markers_is_evaluated(reports, tmp_path, shared_d
     assert outcome.folder is not None and faults(outcome.folder / "report.html") == []
 
 
-def test_a_flight_without_a_camera_is_judged_by_its_navigation(reports, tmp_path, shared_data, faults):
+def test_a_flight_without_a_camera_is_evaluated_by_its_navigation(reports, tmp_path, shared_data, faults):
     flight = imported(tmp_path, "umn-thor75", shared_data("logs", "umn_thor75"))
     _, outcome = evaluate_flight(flight, reports=reports)
     assert outcome.name == "umn-thor75-navigation"
@@ -316,6 +316,9 @@ def test_a_flight_without_a_camera_is_judged_by_its_navigation(reports, tmp_path
         assert found[f"rms_{axis}", "observer"]["value"] < 2 * most
     assert outcome.folder is not None and faults(outcome.folder / "report.html") == []
 
+
+def test_navigation_of_a_logged_flight(reports, tmp_path, shared_data, faults):
+    flight = imported(tmp_path, "umn-thor75", shared_data("logs", "umn_thor75"))
     folder = run("navigation-thor75", reports, flight=flight)
     content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
     assert content["kind"] == "logged"

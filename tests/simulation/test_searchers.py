@@ -85,7 +85,7 @@ def test_a_gondola_hangs_level_and_goes_round_clockwise_at_its_speed():
     assert np.linalg.norm(p[-1, :2] - p[0, :2]) < 50  # about thirty minutes for a lap
 
 
-@pytest.mark.parametrize("distance", [7.0, 10.0, 25.0, 400.0])
+@pytest.mark.parametrize("distance", [7.0, 400.0])
 def test_no_point_within_a_fence_is_further_from_a_row_than_half_their_distance(distance):
     for enclosure in load_twin("uav-search").enclosures.values():
         ends = rows(enclosure, distance).reshape(-1, 2, 2)
