@@ -69,6 +69,20 @@ def test_places_times_and_attitudes_are_those_of_the_flight(ship, tmp_path):
     assert np.allclose(np.linalg.det(turned), 1.0, atol=1e-5)
 
 
+def test_time_counts_from_the_first_pose_whatever_the_clock_shows(ship):
+    def later(tables: dict[str, pd.DataFrame]) -> dict[str, pd.DataFrame]:
+        return {
+            name: table.assign(time_s=table["time_s"] + 1000.0) if "time_s" in table else table
+            for name, table in tables.items()
+        }
+
+    moved = replace(ship, nav=later(ship.nav), tables=later(ship.tables))
+    one, other = (scene_of(flight) for flight in (ship, moved))
+    for part in ("path", "views", "points"):
+        assert np.allclose(getattr(one, part).times, getattr(other, part).times)
+    assert other.path is not None and other.path.times[0] == 0.0
+
+
 def test_what_the_viewer_projects_lands_on_the_detection(ship, tmp_path):
     """Points on the ground, seen through the recording's own camera, are where the images have them."""
     found = saved(ship, tmp_path)

@@ -36,3 +36,14 @@ def test_what_was_not_made_again_is_of_an_earlier_evaluation(tmp_path, table):
     (found,) = own_flights(tmp_path, ())
     assert [one.folder for one in found.reports] == ["f-overview", "f"]
     assert [one.folder for one in found.earlier] == ["f-navigation", "f-tracking"]
+
+
+def test_tracks_that_were_made_after_the_overview_are_current(tmp_path):
+    report(tmp_path / "f-overview", 10, "a", [])
+    report(tmp_path / "f-tracking", 11, "a")
+    (found,) = own_flights(tmp_path, ())
+    assert [one.about for one in found.reports] == ["overview", "tracking"] and not found.earlier
+    # Of other tables, the overview is the one that is of before.
+    report(tmp_path / "f-tracking", 12, "b")
+    (found,) = own_flights(tmp_path, ())
+    assert [one.about for one in found.earlier] == ["overview"]
