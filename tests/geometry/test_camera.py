@@ -76,6 +76,16 @@ def test_lenses_stronger_than_any_have_no_other_inverse():
     assert lost / n < 0.04 and beyond / n < 0.02
 
 
+@pytest.mark.parametrize("axis", [0, 1])
+def test_near_the_fold_of_a_decentred_lens_the_root_is_that_of_the_quadratic(axis):
+    """Along its axis it takes x to x + 3 p x^2."""
+    seen, p, k = np.zeros(2), 0.1, np.zeros(5)
+    seen[axis], k[3 - axis] = -0.8, p
+    found = undistort(seen[None], k)[0]
+    assert found[axis] == pytest.approx((np.sqrt(1 + 12 * p * seen[axis]) - 1) / (6 * p), rel=1e-9)
+    assert found[1 - axis] == 0
+
+
 def test_no_step_leaps_over_the_fold():
     xy, distortion = np.array([[1.032, 1.176]]), (-0.036, 0.286, -0.075, -0.01, -0.018)
     assert np.allclose(undistort(distort(xy, distortion), distortion), xy, atol=1e-9)
