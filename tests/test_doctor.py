@@ -100,24 +100,11 @@ def test_an_environment_of_another_python_or_with_foreign_packages(tmp_path, mon
     assert not finding.ok and "PYTHONPATH" in finding.fix
 
 
-def test_lock_is_read_with_markers(lock):
-    assert [pin.name for pin in doctor.read_lock(lock)] == ["affine", "numpy", "Send2Trash"]
-
-
 def test_packages_that_drifted_are_named(lock):
     assert doctor.check_packages(lock, INSTALLED).ok
     finding = doctor.check_packages(lock, {"affine": "3.0.1", "numpy": "2.4.7"})
     assert not finding.ok and "Send2Trash" in finding.found and "numpy 2.4.7" in finding.found
     assert "affine" not in finding.found
-
-
-@pytest.mark.parametrize("text", ["not a requirement at all !!\n", None])
-def test_unreadable_lock(tmp_path, text):
-    lock = tmp_path / "environment.lock"
-    if text is not None:
-        lock.write_text(text, encoding="utf-8")
-    assert not doctor.check_packages(lock, {}).ok
-    assert not doctor.check_lock(lock, write_pyproject(tmp_path, "affine>=3")).ok
 
 
 def test_lock_behind_pyproject(lock, tmp_path):
