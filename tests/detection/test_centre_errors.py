@@ -45,11 +45,9 @@ def test_the_covariance_of_a_centre_worked_by_hand():
     [
         ((1, 40, 9, 9), "left"),
         ((2, 2, 9, 9), ""),
-        ((40, 1, 9, 9), "top"),
         ((90, 40, 9, 9), "right"),
         ((89, 40, 9, 9), ""),
         ((40, 50, 9, 9), "below"),
-        ((40, 49, 9, 9), ""),
     ],
 )
 def test_which_sides_of_an_image_wider_than_high_cut(box, sides):

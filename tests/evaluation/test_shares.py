@@ -12,22 +12,16 @@ from wildlab.evaluation import shares as s
 @pytest.mark.parametrize(
     ("count", "flights", "verdict"),
     [
-        (200, 200, s.HOLDS),
         (189, 200, s.HOLDS),
         (188, 200, s.MOSTLY),
         (115, 200, s.MOSTLY),
         (113, 200, s.UNDECIDED),
-        (100, 200, s.UNDECIDED),
-        (87, 200, s.UNDECIDED),
         (85, 200, s.MOSTLY_NOT),
         (12, 200, s.MOSTLY_NOT),
         (11, 200, s.FAILS),
-        (0, 200, s.FAILS),
         (3, 3, s.UNDECIDED),
         (5, 5, s.MOSTLY),
-        (20, 20, s.MOSTLY),
         (35, 35, s.HOLDS),
-        (0, 1, s.UNDECIDED),
     ],
 )
 def test_the_interval_decides(count, flights, verdict):
@@ -90,7 +84,7 @@ def test_a_paired_difference_has_students_interval():
     assert s.paired_difference([1.0, np.nan], [1.0, 1.0]) is None
 
 
-@pytest.mark.parametrize("flights", [35, 40, 50, 60, 80, 100, 150, 200, 300])
+@pytest.mark.parametrize("flights", [35, 100, 150, 200, 300])
 def test_how_often_chance_makes_a_verdict_wrong(flights):
     counts = np.arange(flights + 1)
     verdicts = np.array([s.share_verdict(share_interval(int(k), flights)) for k in counts])

@@ -61,15 +61,12 @@ def test_all_files_have_the_same_keys_and_placeholders():
 @pytest.mark.parametrize(
     ("code", "said", "shown"),
     [
-        ("en", length(6.42), "6.4 metres"),
         ("nb", length(6.42), "6,4 meter"),
         ("en", length(0.4), "40 cm"),
         ("sv", length(1234.0), "1,2 km"),
         ("nb", number(12345.0), "12\u00a0345"),
-        ("en", duration(62.0), "62 seconds"),
         ("nb", duration(9000.0), "2,5 timer"),
         ("en", share(0.9999), "99%"),
-        ("en", Quantity("angle", 3.141592653589793), "180 degrees"),
         ("en", Quantity("number", -12.0), "−12"),
         ("en", Day(date(2026, 3, 14), True), "14 March 2026 (UTC)"),
         ("sv", Day(date(2026, 3, 14), False), "mars 2026 (UTC)"),

@@ -93,7 +93,6 @@ COUNTS = {"worth": 0, "troubled": 0}
         (judged(Verdict.FIX), {"worth": 1, "troubled": 1}, "reason-worth"),
         (judged(Verdict.LOOK, doubts=("tracking",)), {"troubled": 1}, "reason-doubts"),
         (judged(Verdict.LOOK), {"troubled": 1}, "reason-troubled"),
-        (judged(Verdict.UNJUDGED), {}, "reason-unjudged"),
         (judged(Verdict.UNJUDGED, judged=1), {}, "reason-unjudged"),
         (judged(Verdict.SOUND, judged=2), {}, "reason-sound"),
     ],
