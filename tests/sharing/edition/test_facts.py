@@ -8,7 +8,7 @@ import pytest
 
 from tests.analysis.robots import KNOWN, robot_flight
 from tests.sharing.edition.flights import flight, overview, report
-from wildlab.analysis.tracks.scores import judged
+from wildlab.analysis.tracks.scores import score_tracks
 from wildlab.analysis.tracks.tracker import track
 from wildlab.analysis.verdict import numbers_of
 from wildlab.flight.tracking_settings import parse_settings
@@ -71,7 +71,7 @@ def test_a_filter_is_as_sure_as_the_tracking_report_found(off_deg, tmp_path):
     settings = parse_settings(KNOWN)
     followed = track(robot_flight(0, heading_off_deg=off_deg), filters=("ekf",), settings=settings)
     made = open_report(study="f-tracking", kind="logged", flight="f", out=str(tmp_path))
-    rows = judged(followed)
+    rows = score_tracks(followed)
     tracking.record(made, rows)
     made.save()
     numbers = numbers_of([read_metrics(tmp_path / "metrics.json")])
