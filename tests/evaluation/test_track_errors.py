@@ -5,6 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from wildlab.errors import WildlabError
+from wildlab.evaluation.consistency import ERROR_CONVENTION
 from wildlab.evaluation.errors import summarise_track, track_errors
 
 

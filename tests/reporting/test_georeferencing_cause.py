@@ -18,7 +18,7 @@ from wildlab.analysis.verdict import (
 )
 from wildlab.evaluation.causes import Gain
 from wildlab.evaluation.ellipses import EllipseVerdict
-from wildlab.evaluation.errors import summarise
+from wildlab.evaluation.errors import AlongAxis, Scatter, summarise
 from wildlab.evaluation.intervals import Interval
 from wildlab.evaluation.outliers import Outlier
 from wildlab.geometry.calibration import Calibration

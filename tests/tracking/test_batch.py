@@ -1,5 +1,6 @@
 """The compiled filters of many runs against the readable filter, run by run."""
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 from tests.tracking.poses import CROOKED, overflight
 from tests.tracking.test_schmidt import random_pose_covariance
+from wildlab.errors import WildlabError
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.tracking import sensors as m
 from wildlab.tracking.batch import BatchCamera, run_batch

@@ -3,12 +3,14 @@
 from functools import partial
 
 import numpy as np
+import pytest
 from hypothesis import given
 
 from tests.tracking.full_filter import beside, full_filter
 from tests.tracking.level_sensors import bearings, consider, ranges_bearings
 from tests.tracking.poses import GENERATORS, overflight
 from tests.tracking.test_schmidt import growing
+from wildlab.errors import WildlabError
 from wildlab.tracking import sensors as m
 from wildlab.tracking import sensors as p
 from wildlab.tracking.motion import constant_velocity, white_acceleration

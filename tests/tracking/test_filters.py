@@ -11,11 +11,12 @@ from scipy.linalg import block_diag, expm
 from tests.tracking.full_filter import beside, full_filter
 from tests.tracking.level_sensors import bearings, consider, measured_from, ranges_bearings
 from tests.tracking.poses import overflight, turned
+from wildlab.errors import WildlabError
 from wildlab.geometry.frames import wrap
 from wildlab.tracking import sensors as m
 from wildlab.tracking.filters import run_coloured, run_imm, run_unscented, thin
 from wildlab.tracking.initiation import start_from_first
-from wildlab.tracking.motion import constant_velocity, singer, white_acceleration
+from wildlab.tracking.motion import constant_velocity, rest, singer, white_acceleration
 from wildlab.tracking.run import Start, run_filter
 from wildlab.tracking.schmidt import Considered
 from wildlab.tracking.sensors import predict_range_bearing

@@ -8,10 +8,11 @@ import pytest
 from filterpy.kalman import KalmanFilter
 from scipy.stats import chi2
 
+from tests.tracking.level_sensors import ranges_bearings
 from tests.tracking.poses import overflight, turned
 from wildlab.errors import WildlabError
 from wildlab.tracking import sensors as m
-from wildlab.tracking.batch import run_batch
+from wildlab.tracking.batch import BatchCamera, run_batch
 from wildlab.tracking.filters import run_coloured, run_imm, run_unscented
 from wildlab.tracking.initiation import start_from_first
 from wildlab.tracking.kalman import filter_at_rest, predict, update

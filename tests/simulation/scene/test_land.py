@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix
@@ -13,6 +14,8 @@ from wildlab.geometry.mount import R_MC_DOWN, Mount
 from wildlab.simulation.landscape import TREES_M, UNEVEN, grow_trees, synthetic_landscape
 from wildlab.simulation.scene import (
     EVEN_LAND,
+    GRASS,
+    SAND,
     Cover,
     Land,
     LandScene,

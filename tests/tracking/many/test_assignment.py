@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from wildlab.errors import WildlabError
 from wildlab.tracking.association import (
     feature_distances,
     global_nearest,

@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 import pytest
 
+from wildlab.errors import WildlabError
 from wildlab.geometry.covariances import gate_threshold
 from wildlab.tracking.association import Appearance
 from wildlab.tracking.many.bank import Looks, Tuning, run_bank

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.tracking.poses import GENERATORS
+from wildlab.errors import WildlabError
 from wildlab.tracking.many.tracks import count_interval, count_probabilities
 from wildlab.tracking.motion import constant_velocity, in_steps
 from wildlab.tracking.particles import (
