@@ -6,19 +6,28 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.io
+from scipy.spatial.transform import Rotation
 
-from tests.sound_logs import NED
+from tests.sound_logs import NED, QUATERNION
 from tests.sound_logs import VELOCITY as SPEED
 from wildlab.files import sha256
 from wildlab.flight.catalog import read_catalog
 from wildlab.flight.checks.check import check_flight, usable_for
-from wildlab.flight.checks.inertial import FORCE, RATE
+from wildlab.flight.checks.inertial import FORCE, RATE, turns
+from wildlab.flight.checks.inertial import samples as inertial_samples
 from wildlab.flight.clocks import gnss_times
 from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.store import Flight, load_flight
 from wildlab.paths import DATA
 
 THOR = "thor_flight75_WaypointTracker_150squareWaypointNew_2012_10_10.mat"
+
+
+def at_rest(flight: Flight, begin: float, end: float) -> tuple[float, np.ndarray]:
+    """Size of the mean force, m/s2, and mean rates, rad/s."""
+    imu = flight.table("imu")
+    still = imu[imu["time_s"].between(begin, end)]
+    return float(np.linalg.norm(still[list(FORCE)].mean())), still[list(RATE)].mean().to_numpy()
 
 
 def test_thor_is_the_log_where_it_changes(thor, shared_data):
@@ -63,12 +72,49 @@ def x8(shared_data: Callable[..., Path], tmp_path_factory: pytest.TempPathFactor
     return _import("inertialnav-x8", shared_data("logs", "inertialnav_x8"), folder)
 
 
+def _gyro_fits(flight: Flight, moving: tuple[float, float]) -> np.ndarray:
+    """Correlation of the rates with those of the onboard attitude, each axis, while flying."""
+    imu = inertial_samples(flight)
+    (turn,) = turns(flight)
+    rate = imu.mean_rate(turn.start, turn.end)
+    good = np.isfinite(rate).all(axis=1) & (turn.start > moving[0]) & (turn.end < moving[1])
+    return np.array([np.corrcoef(rate[good, i], turn.rate[good, i])[0, 1] for i in range(3)])
+
+
+def test_thor_ranges(thor):
+    gnss, nav = thor.table("gnss"), thor.nav["onboard"]
+    for table in (gnss, nav):
+        assert np.abs(table[NED].to_numpy()).max() < 400  # degrees and radians both ended up there
+    assert np.hypot(gnss[SPEED[0]], gnss[SPEED[1]]).max() == pytest.approx(26.4, abs=0.5)
+    assert gnss["down_m"].min() == pytest.approx(-74, abs=2)
+    # away from the start, where the receiver was still settling
+    assert nav.loc[nav["time_s"] > 60, "down_m"].max() < 2
+    assert at_rest(thor, 640, 690)[0] == pytest.approx(9.81, abs=0.1)
+    assert (_gyro_fits(thor, (212, 579)) > [0.98, 0.97, 0.88]).all()
+
+
 def test_thor_has_the_raw_sensor(thor):
     """With the biases back, every sample is a whole number of the sensor's steps: 0.05 deg/s and 3.33 mg."""
     imu = thor.table("imu")
     for columns, step in ((RATE, np.radians(0.05)), (FORCE, 0.00333 * 9.814)):
         steps = imu[list(columns)].to_numpy() / step
         assert np.abs(steps - np.round(steps)).max() < 1e-3
+
+
+def test_x8_ranges(x8):
+    gnss, nav = x8.table("gnss"), x8.nav["onboard"]
+    assert len(gnss) == 3049  # 3050 less the one that is logged twice
+    assert np.diff(gnss["time_s"]).max() < 0.6  # the hole of 2.5 s is in the receiver's own stamps alone
+    # The attitude ends 0.22 s after the last position, latency taken off.
+    assert nav["time_s"].iloc[-1] == pytest.approx(gnss_times(x8)[-1], abs=0.02)
+    assert np.hypot(gnss[SPEED[0]], gnss[SPEED[1]]).max() == pytest.approx(32.15, abs=0.1)
+    assert np.abs(gnss[NED[:2]].to_numpy()).max() < 300
+    force, rates = at_rest(x8, 20, 45)
+    assert force == pytest.approx(9.65, abs=0.05) and np.abs(rates).max() < 0.005
+    assert (_gyro_fits(x8, (280, 590)) > 0.99).all()
+    # attitudes through the vertical stay a rotation each
+    R = Rotation.from_quat(nav[QUATERNION].to_numpy(), scalar_first=True)
+    assert np.degrees((R[:-1].inv() * R[1:]).magnitude()).max() < 20
 
 
 def test_x8_velocity_is_that_of_its_positions(x8):

@@ -158,6 +158,16 @@ def test_what_the_manifest_admits(make_flight, manifest, level, field):
     assert [one.level for one in check_flight(flight) if one.field == field] == [level]
 
 
+@pytest.mark.parametrize("noise_m", [0.0, 0.3])
+def test_what_a_clock_is_worth_is_by_the_flights_own_speed(make_flight, noise_m):
+    flight = make_flight()
+    nav, rng = flight.nav["autopilot"], np.random.default_rng(0)
+    flight.nav["autopilot"] = nav.assign(north_m=nav["north_m"] + rng.normal(0, noise_m, len(nav)))
+    (facts,) = (one.facts for one in check_flight(flight) if one.code == "camera-clock")
+    assert facts["speed"] == pytest.approx(np.hypot(20.0, 3.0), rel=0.02)
+    assert facts["metres"] == pytest.approx(facts["speed"] / 10)
+
+
 @pytest.mark.parametrize(
     ("manifest", "change", "usable"),
     [
@@ -176,3 +186,15 @@ def test_what_it_can_be_used_for(make_flight, monkeypatch, manifest, change, usa
     uses = usable_for(flight)
     assert [use.usable for use in uses] == [*usable, False]
     assert all(use.why for use in uses)
+
+
+@pytest.mark.parametrize(("fewest", "usable"), [(3, True), (4, False)])
+def test_a_target_seen_in_few_images_has_no_track(make_flight, monkeypatch, fewest, usable):
+    flight = make_flight()
+    images = flight.tables["frames"]["frame_id"].tolist()[:3]
+    seen = flight.tables["detections"].iloc[[0] * 4].assign(frame_id=[*images, images[0]])
+    seen = pd.concat([seen, seen.iloc[:1].assign(target_id="seen once")])
+    flight.tables["detections"] = seen.assign(detection_id=[f"d{k}" for k in range(5)])
+    monkeypatch.setattr("wildlab.flight.checks.check.FEWEST_SCANS", fewest)
+    (use,) = [use for use in usable_for(flight) if use.purpose == "tracking"]
+    assert use.usable == usable

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wildlab.flight.checks.attitude import heading
+from wildlab.flight.checks.attitude import follows, headed, heading
 from wildlab.flight.checks.findings import POSITION, QUATERNION
-from wildlab.flight.checks.inertial import FLYING, FORCE, RATE, Inertial, why_no_start
+from wildlab.flight.checks.inertial import FLYING, FORCE, RATE, Inertial, samples, why_no_start
 from wildlab.flight.manifest_parts import MountPart
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import euler_to_matrix, matrix_to_quaternion
@@ -41,6 +41,17 @@ def test_the_mean_of_a_ramp_is_its_value_in_the_middle(offset, slope, start, len
         assert np.isnan(found[1:]).all()
 
 
+def test_samples_without_a_number_are_left_out():
+    class Flight:
+        imu = pd.DataFrame({"time_s": TIMES, **{name: 1.0 + 0 * TIMES for name in (*FORCE, *RATE)}})
+
+    Flight.imu.loc[5, "w_y_rad_s"] = np.nan
+    found = samples(Flight())
+    assert found is not None and len(found.times) == len(TIMES) - 1 and TIMES[5] not in found.times
+    Flight.imu.loc[7, "time_s"] = TIMES[3]
+    assert samples(Flight()) is None
+
+
 def flown(make_flight: Callable[..., Flight], north: float, east: float, *, velocities: bool) -> Flight:
     """A straight flight of 20 s at an even speed, with inertial samples in its second half."""
     flight, t = make_flight(), np.arange(21.0)
@@ -62,6 +73,14 @@ def test_the_speed_counts_whichever_way_it_goes(make_flight, turn, velocities):
         flight = flown(make_flight, speed * np.cos(turn), speed * np.sin(turn), velocities=velocities)
         why = why_no_start(flight)
         assert why == "" if fast else f"moves at {speed:.1f} m/s" in why
+
+
+def test_what_was_fast_before_the_inertial_samples_tells_nothing(make_flight):
+    flight = flown(make_flight, 3.0, 0.0, velocities=True)
+    flight.tables["gnss"].loc[:8, "v_east_m_s"] = 20.0
+    assert "moves at 3.0 m/s" in why_no_start(flight)
+    flight.tables["gnss"] = flight.tables["gnss"].loc[:8]
+    assert "no satellite position is of a time with inertial measurements" in why_no_start(flight)
 
 
 T = np.arange(0, 300, 0.5)
@@ -116,3 +135,9 @@ def test_the_usual_mistakes_about_yaw_are_named(yaw, cause):
 )
 def test_nothing_is_said_where_no_mistake_explains_it(flight):
     assert causes(flight) == []
+
+
+def test_the_mean_cosine_is_that_of_a_known_angle():
+    given = headed(_Flight(COURSE + 0.3).nav["log"])
+    # The course over two seconds is that of their middle, but for the half step the positions lie late.
+    np.testing.assert_allclose(follows(*given[:2]), np.cos(0.3), atol=0.02)

@@ -57,7 +57,8 @@ def causes(found: list[Finding]) -> set[str]:
     return {cause for one in found for cause in one.causes}
 
 
-@pytest.mark.parametrize(("who", "velocity"), [("gnss", True), ("nav", False)])
+@pytest.mark.parametrize("who", ["gnss", "nav"])
+@pytest.mark.parametrize("velocity", [True, False])
 def test_a_leap_is_not_the_clock_though_it_looks_like_one(who, velocity):
     flight = straight_flight(leap=60.0, who=who, velocity=velocity)
     # Without what tells the two apart the clock is blamed: 60 m at 17 m/s are three and a half seconds.
@@ -67,6 +68,22 @@ def test_a_leap_is_not_the_clock_though_it_looks_like_one(who, velocity):
     (leap,) = (one for one in found if one.causes)
     assert leap.table == ("gnss" if who == "gnss" else "nav/autopilot")
     assert "60 m at 25.0 s" in leap.sentence
+
+
+@pytest.mark.parametrize(
+    ("change", "cause"),
+    [
+        (lambda p: p - [0, 0, 40.0], "constant height"),
+        (lambda p: p * [-1, 1, 1], "gnss: north negated"),
+        (lambda p: p[:, [1, 0, 2]], "gnss: north and east exchanged"),
+    ],
+)
+def test_mistakes_about_places_are_named_and_undone(change, cause):
+    flight = straight_flight(turning=0.8)
+    columns = ["north_m", "east_m", "down_m"]
+    flight.tables["gnss"][columns] = change(flight.tables["gnss"][columns].to_numpy())
+    found = [one for one in positions(flight) if cause in one.causes]
+    assert any(list(positions(undo(flight))) == [] for one in found for undo in one.corrections)
 
 
 @pytest.mark.parametrize("turning", [0.0, 0.8])

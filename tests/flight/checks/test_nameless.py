@@ -4,13 +4,13 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from tests.flight.checks.test_sound_flights import POSES, euler
 from wildlab.flight.checks import known_points
 from wildlab.flight.checks.check import check_flight, usable_for
 from wildlab.flight.checks.findings import Finding
-from wildlab.flight.checks.mistakes import Mistake
 from wildlab.flight.checks.sightings import sightings
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
@@ -56,7 +56,6 @@ def test_what_is_right_is_not_accused_however_few_are_known(flown, count):
     assert told(replace(few(flown, count), manifest=nearest)) == []
 
 
-@pytest.mark.slow
 def test_where_few_are_known_a_share_that_grows_proves_nothing(flown):
     """Negated yaw, and undone: of 1 of 25 animals a share is too small to be told from others'."""
     assert told(few(turned(flown, lambda a: a * [1, 1, -1]), 1)) == []
@@ -67,8 +66,6 @@ def test_what_meets_targets_often_enough_needs_no_explanation(flown, monkeypatch
     """As where a mount is off by a few degrees, which another mistake may make up for."""
     given = sightings(flown, "autopilot")
     assert given is not None
-    way = Mistake("a", "a", "a", lambda s: replace(s))
-    monkeypatch.setattr(known_points, "_nameless_mistakes", lambda flight, s: [way])
     monkeypatch.setattr(known_points, "shares", lambda s: np.full(3, before if s is given else 0.9))
     assert bool(list(known_points.nameless(flown, given))) is accused
 
@@ -87,14 +84,34 @@ def test_a_wrong_attitude_is_named_also_where_half_of_them_are_known(flown, chan
     assert told(with_others(turned(flown, change))) == []
 
 
-def test_a_clock_that_is_off_is_named_with_what_to_write(flown, monkeypatch):
-    monkeypatch.setattr(known_points, "NAMELESS_CLOCKS", np.arange(-12.0, 13.0, 4.0))
+def test_a_clock_that_is_off_is_named_with_what_to_write(flown):
     frames = flown.table("frames")
     late = replace(flown, tables={**flown.tables, "frames": frames.assign(time_s=frames["time_s"] + 8.0)})
-    *_, clock = known_points._nameless_mistakes(late, sightings(late, "autopilot"))
-    assert clock.cause == "clock of the camera"
-    written = float(clock.fix.split("camera_offset_s = ")[1].split("`")[0])
+    (found,) = told(late)
+    assert "clock of the camera" in found.causes
+    written = float(found.fix.split("camera_offset_s = ")[1].split("`")[0])
     assert written == pytest.approx(flown.manifest.clocks.camera_offset_s - 8.0, abs=1.0)
+
+
+def test_a_name_that_is_no_known_targets_says_nothing_of_known_ones(flown):
+    wrong = turned(flown, lambda a: a * [1, 1, -1])
+    detections = wrong.table("detections").assign(target_id="somebody else")
+    assert told(replace(wrong, tables={**wrong.tables, "detections": detections})) == []
+
+
+def test_other_things_in_a_photo_are_no_wrong_photo(flown):
+    seen_by = flown.table("detections")
+    # One in a photo, so that all in it are soon of others.
+    rows = seen_by.drop_duplicates("frame_id").iloc[::15].reset_index(drop=True)
+    more = [rows.iloc[[5, 25, 45]].assign(u_px=u, v_px=30.0, detection_id=[f"{u}-{i}" for i in range(3)])
+            for u in (20.0, 320.0, 620.0)]  # fmt: skip
+    both = pd.concat([rows, *more], ignore_index=True)
+    strange = replace(flown, tables={**flown.tables, "detections": both})
+    assert told(strange) == []
+    # Where it is said that each is of a known target, it is.
+    nearest = replace_in_manifest(flown.manifest, {"scoring": {"rule": "nearest"}})
+    (found,) = told(replace(strange, manifest=nearest))
+    assert found.causes == ("one photo off",)
 
 
 def test_places_can_be_judged_by_names_or_where_the_nearest_is_meant(flown):

@@ -4,11 +4,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wildlab.flight.checks import camera, mistakes, motion, tables
+from tests.analysis.survey_twin import Survey, simulate
+from wildlab.flight.checks import camera, mistakes, motion, sensors, tables
 from wildlab.flight.checks.attitude import Felt, FieldStep, felt_mistakes, field_mistakes
 from wildlab.flight.checks.mistakes import attitude_mistakes, axes_words, other_axes, place_mistakes
+from wildlab.flight.checks.sightings import sightings
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.geometry.frames import euler_to_matrix
+from wildlab.simulation.twins import simulate_twin
 
 ORIGIN = (np.radians(63.4), np.radians(10.4), 40.0)
 
@@ -74,6 +77,16 @@ def test_a_place_mistake_is_undone_exactly(cause, read):
     np.testing.assert_allclose(undone, right, atol=1e-3)
 
 
+def test_however_well_attitudes_are_stated_the_camera_is_not_known_that_well():
+    """Clicks are held against what is expected: beside next to nothing all of them would be wrong."""
+    expected = []
+    for stated in (1e-9, 0.01, 1.0):
+        found = sightings(simulate(Survey(images=6, stated_deg=stated)), "logged")
+        expected.append(found.sd[0, [0, 3]])
+    assert np.array_equal(expected[0], expected[1]) and (expected[0] > np.radians(0.1)).all()
+    assert np.allclose(expected[2], np.radians(1.0))
+
+
 def _log(**changes: float) -> pd.DataFrame:
     t = np.arange(0, 120.0)
     v = np.column_stack([15 * np.cos(t / 9), 15 * np.sin(t / 9), 2 * np.sin(t / 5)])
@@ -125,9 +138,9 @@ def test_beyond_bounds_is_a_problem_with_row_and_value(make_flight, table, colum
     [
         ({}, None),
         ({"fx_px": 19.0, "fy_px": 19.0}, "millimetres"),
-        ({"cx_px": 256.0, "cy_px": 320.0}, "far from the middle"),
+        ({"cx_px": 256.0, "cy_px": 320.0}, "cx and cy"),
         ({"cx_px": 640.0, "cy_px": 512.0, "width_px": 1280, "height_px": 1024}, None),
-        ({"cx_px": 160.0, "cy_px": 128.0}, "far from the middle"),
+        ({"cx_px": 160.0, "cy_px": 128.0}, "times as large"),
     ],
 )
 def test_numbers_of_a_camera(make_flight, changes, said):
@@ -136,6 +149,12 @@ def test_numbers_of_a_camera(make_flight, changes, said):
     found = list(camera.lens(flight))
     assert (said is None) == (found == [])
     assert said is None or said in found[0].sentence
+
+
+def test_a_degree_of_latitude_turns_level_by_a_degree():
+    assert motion.turned(np.array([111_195.0, 0.0, 0.0]), ORIGIN) == pytest.approx(1.0, abs=0.02)
+    # Along a parallel, north turns by the sine of the latitude and level by its cosine.
+    assert motion.turned(np.array([0.0, 49_900.0, 0.0]), ORIGIN) == pytest.approx(1.0, abs=0.02)
 
 
 @pytest.mark.parametrize(("north", "level"), [(5e3, None), (30e3, "warning"), (300e3, "problem")])
@@ -167,6 +186,22 @@ def test_ground_heights_against_the_truth(make_flight):
     assert "45 m above" in found.sentence
 
 
+def test_a_target_seen_beside_its_truth():
+    beside = np.random.default_rng(4).normal([25, 0], 2, (60, 2))
+    offset, there, here = sensors.offset_of(beside)
+    assert offset == pytest.approx([25, 0], abs=1.5)
+    assert there > 0.9
+    assert here == 0
+
+
+def test_positions_that_stand_still_are_no_unit_of_speed():
+    flight = simulate_twin("fast-vessel", 1)
+    nav = flight.nav["autopilot"]
+    flight.nav = {"autopilot": nav.assign(north_m=0.0, east_m=0.0, down_m=-300.0)}
+    (said,) = [one for one in motion.motion(flight) if one.table != "gnss"]
+    assert said.level == "warning" and said.causes == ()
+
+
 def said_of(words: str) -> np.ndarray:
     """The matrix that ``"x is minus y"`` stands for: what is right, of what is read."""
     M = np.eye(3)
@@ -183,16 +218,14 @@ def test_axes_are_undone_as_the_words_say():
     right = rng.normal(size=(5, 3))
     turns = np.tile(np.eye(3), (5, 1, 1))
     everything = list(other_axes())
-    felt = {one.cause: one for one in felt_mistakes("log")}
-    field = {one.cause: one for one in field_mistakes("log")}
     assert len(everything) == 47 and len({M.tobytes() for M in everything}) == 47
     for M in everything:
         words = axes_words(M)
         assert np.array_equal(said_of(words), M)
         read = right @ said_of(words)  # row by row: right = M read, and M has its transpose for inverse
-        undone = felt[f"axes of [imu.rate]: {words}"].undo(
-            Felt(turns, turns, np.ones(5), read, read, turns, right, np.arange(5.0))
-        )
+        (mistake,) = [one for one in felt_mistakes("log") if one.cause == f"axes of [imu.rate]: {words}"]
+        undone = mistake.undo(Felt(turns, turns, np.ones(5), read, read, turns, right, np.arange(5.0)))
         assert np.allclose(undone.rate, right) and np.array_equal(undone.force, read)
-        seen = field[f"axes of the magnetometer: {words}"].undo(FieldStep(read, read, turns, turns, None))
+        (mistake,) = [one for one in field_mistakes("log") if one.cause.endswith(f"magnetometer: {words}")]
+        seen = mistake.undo(FieldStep(read, read, turns, turns, None))
         assert seen is not None and np.allclose(seen.before, right) and np.allclose(seen.after, right)

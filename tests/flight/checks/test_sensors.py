@@ -1,5 +1,6 @@
 """Sensors, poses, frames and truth of a flight: what disagrees, lies in a gap or stands there twice."""
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -14,9 +15,9 @@ from wildlab.errors import WildlabError
 from wildlab.flight.checks.check import check_flight
 from wildlab.flight.checks.findings import Finding
 from wildlab.flight.checks.sensors import sensors
-from wildlab.flight.checks.tables import overlap
+from wildlab.flight.checks.tables import duplicates
 from wildlab.flight.clocks import poses_at
-from wildlab.flight.manifest import replace_in_manifest
+from wildlab.flight.manifest import make_manifest, replace_in_manifest
 from wildlab.flight.store import Flight
 
 
@@ -70,6 +71,13 @@ def test_a_misspelt_sensor_is_named(make_flight):
     ]
 
 
+def test_several_sources_in_one_look_are_good_to_know(make_flight):
+    flight = detected(make_flight, LOOKS, [(0, "radar"), (0, "program"), (1, "lidar")])
+    (note,) = said(flight)
+    assert note.level == "note" and "1 of 1" in note.sentence
+    assert scans_of(flight, "radar").ids.tolist() == [["d-0"], [""]]
+
+
 def test_what_agrees_or_is_not_said_is_no_finding(make_flight):
     assert said(detected(make_flight, LOOKS, [(0, "radar"), (1, "lidar"), (2, "radar")])) == []
     # Images of a camera beside: their detections are no sensor's.
@@ -92,6 +100,25 @@ def test_two_sensors_may_look_at_once_and_one_may_not_look_twice(make_flight, ti
     assert [one.sentence.split()[2] for one in found] == repeated
 
 
+@pytest.mark.parametrize(
+    ("camera", "stated", "silent"),
+    [
+        (True, {}, []),
+        (False, {}, [["lidar", "radar"]]),
+        (False, {"radar": {"clock_offset_s": 0.0}}, [["lidar"]]),
+        (False, {"radar": {"clock_offset_s": -0.5}, "lidar": {"clock_offset_s": -0.5}}, []),
+    ],
+)
+def test_without_a_camera_it_is_the_sensors_whose_clocks_are_taken_to_agree(
+    make_flight, camera, stated, silent
+):
+    flight = detected(make_flight, LOOKS, [(0, "radar"), (1, "lidar")])
+    data = flight.manifest.model_dump(exclude=set() if camera else {"camera"})
+    manifest = replace_in_manifest(make_manifest(data), {"sensors": stated})
+    found = check_flight(replace(flight, manifest=manifest))
+    assert [re.findall("'([a-z]+)'", one.sentence) for one in found if one.field == "sensors"] == silent
+
+
 Make = Callable[..., Flight]
 
 
@@ -109,7 +136,7 @@ def of_truths(flight: Flight, spans: dict[str, tuple[float, float]]) -> list[Fin
     ]
     truth = pd.concat(rows, ignore_index=True).assign(north_m=900.0, east_m=50.0, down_m=0.0)
     flight.tables["truth"] = truth
-    found = [one for one in overlap(flight) if one.table == "truth"]
+    found = [one for one in check_flight(flight) if (one.table, one.field) == ("truth", "time_s")]
     return [one for one in found if one.level != "note"]
 
 
@@ -180,6 +207,34 @@ def test_the_same_place_in_another_look_or_by_another_sensor_is_no_double(make_f
     assert doubles(flight) == []
 
 
+@pytest.mark.parametrize(
+    ("source", "rows", "later", "copied"),
+    [
+        ("radar", 20, 0.0, True),
+        ("radar-2", 20, 0.0, True),
+        ("radar-2", 12, 0.0, True),
+        # Few that are alike, and those of other times, are no copy.
+        ("radar-2", 0, 0.0, False),
+        ("radar-2", 5, 0.0, False),
+        ("radar-2", 20, 0.05, False),
+    ],
+)
+def test_a_log_that_was_read_twice_is_a_problem(make_flight, source, rows, later, copied):
+    """The first looks once more, under other names, as from a copy of the log that ends earlier."""
+    t = np.linspace(1, 8, 20)
+    place = {"north_m": np.random.default_rng(1).normal(0, 50, 20), "east_m": 3.0, "down_m": 0.0}
+    flight = watch(make_flight, level_poses(t, t), t, place, kind="position")
+    frames = flight.table("frames").drop(columns="sensor")
+    more = frames.iloc[:rows].assign(frame_id="again " + frames["frame_id"], time_s=frames["time_s"] + later)
+    both = pd.concat([frames, more]).sort_values("time_s", kind="stable", ignore_index=True)
+    once = flight.table("detections").iloc[:rows]
+    again = with_more(flight, once.assign(frame_id="again " + once["frame_id"], source=source))
+    again.tables["frames"] = both
+    found = list(duplicates(again))
+    assert [one.level for one in found] == ["problem"] * copied
+    assert not copied or f"{rows} of {rows}" in found[0].sentence
+
+
 def test_receivers_that_end_early_are_one_warning_without_the_zone(make_flight):
     names = [f"collar {k}" for k in range(7)]
     (found,) = of_truths(flown(make_flight), {name: (0.0, 90.0 + 0.3 * k) for k, name in enumerate(names)})
@@ -191,6 +246,13 @@ def test_receivers_that_end_early_are_one_warning_without_the_zone(make_flight):
 def test_receivers_of_different_times_are_told_apart(make_flight):
     found = of_truths(flown(make_flight), {"a": (0.0, 90.0), "b": (0.0, 40.0), "c": (0.0, 91.0)})
     assert ["'b'" in one.sentence for one in found] == [False, True]
+
+
+@pytest.mark.parametrize(("begins_s", "zone"), [(900.0, True), (930.0, True), (1200.0, False)])
+def test_the_zone_is_named_near_quarters_of_an_hour(make_flight, begins_s, zone):
+    (found,) = of_truths(flown(make_flight, 2400.0), {"boat": (begins_s, 2500.0)})
+    assert ("zone" in found.fix) == zone
+    assert (f"{begins_s - 1:.1f} s after" in found.fix) != zone
 
 
 def test_truth_of_another_day_is_a_problem_that_names_the_zone(make_flight):

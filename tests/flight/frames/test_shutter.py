@@ -1,4 +1,4 @@
-"""Frames of a closed shutter, dead pixels and dark corners: found, and not invented."""
+"""Frames of a closed shutter or a held picture, dead pixels and dark corners: found, and not invented."""
 
 from pathlib import Path
 
@@ -6,13 +6,15 @@ import cv2
 import numpy as np
 import pytest
 
-from wildlab.flight.readers.frames import open_frames
+from wildlab.flight.readers.frames import Frame, open_frames
 from wildlab.flight.readers.frames.scene import (
+    MOST_DEAD,
     find_dead,
     is_shutter,
     measure_vignetting,
     without_vignetting,
 )
+from wildlab.flight.readers.frames.sequence import mark_shutter
 from wildlab.simulation.scene.response import CameraResponse, Sensor, expose, sensor_of
 
 SHAPE = (128, 160)
@@ -95,6 +97,43 @@ def test_even_scenes_are_no_shutter():
     assert is_shutter(bordered, WHOLE & (np.arange(128)[:, None] >= 40))
 
 
+def frames_of(numbers: list[int]) -> list[Frame]:
+    images = {number: (7000 + 25 * (ground(number) - 285)).astype(np.uint16) for number in set(numbers)}
+    return [
+        Frame(f"{place}", None, images[number], "counts", "white-hot", WHOLE)
+        for place, number in enumerate(numbers)
+    ]
+
+
+def test_a_held_picture_is_told_from_the_third_frame_on_where_frames_differ_as_a_rule():
+    numbers = [1, 2, 2, 3, 3, 3, 3, 4]
+    marked = [one.usable for one in mark_shutter(frames_of(numbers), held_can_be_told=True)]
+    assert marked == [True, True, True, True, True, False, False, True]
+    assert all(one.usable for one in mark_shutter(frames_of(numbers), held_can_be_told=False))
+
+
+def held_folder(path: Path, numbers: list[int]) -> Path:
+    path.mkdir()
+    for place, one in enumerate(frames_of(numbers)):
+        assert cv2.imwrite(str(path / f"{place:03d}.png"), one.image)
+    return path
+
+
+def test_a_run_that_goes_on_marks_the_same_frames(tmp_path):
+    numbers = [*range(10), 10, 10, 10, 10, *range(11, 30)]
+    frames = open_frames(held_folder(tmp_path / "in", numbers))
+    whole = [one.problem for one in frames]
+    assert [number for number, problem in enumerate(whole) if problem] == [12, 13]
+    for first in (0, 1, 11, 12, 13, 14):
+        assert [one.problem for one in frames.starting_at(first)] == whole[first:]
+    assert [one.problem for one in frames.some([10, 13, 20])] == [whole[10], whole[13], whole[20]]
+
+
+def test_where_neighbours_are_alike_as_a_rule_nothing_is_held(tmp_path):
+    frames = open_frames(held_folder(tmp_path / "in", [n // 4 for n in range(32)]))
+    assert not frames.kept.held_can_be_told and all(one.usable for one in frames)
+
+
 def scenes(count: int = 8, rough: float = 2.0) -> list[np.ndarray]:
     rng = np.random.default_rng(5)
     return [7000 + 25 * (ground(n, rough) - 285) + rng.normal(0, 1.25, SHAPE) for n in range(count)]
@@ -143,6 +182,13 @@ def test_dark_corners_are_measured_and_taken_off(fall):
     assert measure_vignetting(plain, WHOLE) is None
 
 
+def test_whole_numbers_stay_whole_and_within_their_kind():
+    offset = np.array([[-10.4, 10.4]], np.float32)
+    assert without_vignetting(np.array([[250, 5]], np.uint8), offset).tolist() == [[255, 0]]
+    assert without_vignetting(np.array([[250, 50]], np.uint16), offset).tolist() == [[260, 40]]
+    assert without_vignetting(np.array([[280.0, 5]], np.float32), offset).dtype == np.float32
+
+
 def test_the_one_iterator_takes_the_corners_off_where_that_is_asked(tmp_path):
     flight(
         tmp_path / "in", np.array([0.0, 0.2, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2]), CameraResponse(vignetting=4.0)
@@ -170,3 +216,12 @@ def test_real_frames_are_no_shutter_and_one_camera_has_one_dead_pixel(shared_dat
         dead, vignetting = frames.kept.dead, frames.kept.vignetting
         assert dead is not None and np.argwhere(dead).tolist() == [[368, 89]]
         assert vignetting is not None and -60 < vignetting.corner < -20
+
+
+def test_few_grey_levels_repeat_without_a_fault():
+    rng = np.random.default_rng(4)
+    seen = [rng.normal(100, 0.8, (120, 160)).round().astype(np.uint8) for _ in range(7)]
+    still = np.all([one == seen[0] for one in seen], axis=0)
+    assert 20 < still.sum() < MOST_DEAD * still.size
+    dead = find_dead(seen, np.ones((120, 160), bool))
+    assert dead is not None and not dead.any()

@@ -58,6 +58,7 @@ from wildlab.files import write_atomic, write_csv, write_json
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.files import printable, read_regular
 from wildlab.flight.readers.frames import Frame, Frames, Polarity, open_frames
+from wildlab.flight.readers.frames.sequence import CORRECTIONS
 from wildlab.flight.readers.labels import Labels, read_labels
 from wildlab.flight.store import load_flight
 from wildlab.geometry.frames import Array
@@ -439,7 +440,7 @@ def facts_of_frames(frames: Frames, detected: Detected) -> list[Fact]:
     kept = frames.kept
     found = [fact("detect-note", note=f"{note[0].upper()}{note[1:]}") for note in kept.notes]
     problems = detected.frames["problem"].fillna("").astype(str)
-    corrections = int(problems.str.contains("flat-field correction").sum())
+    corrections = int(problems.str.contains("|".join(CORRECTIONS)).sum())
     if corrections:
         found.append(fact("detect-corrections", n=corrections, of=len(problems)))
     if kept.dead is not None and kept.dead.any():

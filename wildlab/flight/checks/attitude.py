@@ -28,6 +28,7 @@ from wildlab.flight.checks.mistakes import (
     Change,
     Misfit,
     Mistake,
+    alternate,
     attitude_mistakes,
     attitudes_in,
     axes_words,
@@ -56,6 +57,8 @@ USUAL_RATE, RATE_SHARE, USUAL_FORCE, FORCE_SHARE = 0.03, 0.15, 0.8, 0.15
 #: Turns between attitudes: over at most so long (s), at most so many, and at least so many.
 STEP_S, MOST, ENOUGH = 0.5, 600, 30
 COUNTED = 0.97
+#: A correlation beyond this in either half is a sign, where so many intervals spread by so much (m/s^2).
+AGAINST, AGAINST_ENOUGH, LIVELY = 0.4, 100, 0.1
 #: Cosine between rates and turns of the attitude, over all, below which no unit makes one of the other.
 ALONG = 0.5
 #: Without a known mistake, this many times what is usual is said.
@@ -183,6 +186,11 @@ def forces(flight: Flight) -> Iterator[Finding]:
                 named,
                 {**facts, "turns_then": after[0], "forces_then": after[1]},
             )
+        # Where the turns do not fit either, the sign of a force is none of the causes.
+        elif before[0] <= UNEXPLAINED and (axes := against(given)):
+            facts["key"] = key = listed(["xyz"[axis] for axis in axes])
+            field = f"f_{'xyz'[axes[0]]}_m_s2"
+            yield Finding("warning", "imu", field, "force-against", facts, (f"sign of force {key}",))
         elif (error := heading_error(given)) is not None:
             by, sd = np.degrees(error)
             low, high = abs(by) - 1.96 * sd, abs(by) + 1.96 * sd
@@ -240,6 +248,22 @@ def heading_error(f: Felt) -> HeadingError | None:
     off = np.angle(np.exp(1j * (np.array(without) - by)))
     sd = float(np.sqrt((BLOCKS - 1) * np.mean((off - off.mean()) ** 2)))
     return HeadingError(by, sd) if HEADING_OFF + SURE * sd < abs(by) < np.pi / 4 else None
+
+
+def against(f: Felt) -> list[int]:
+    """Axes whose force runs against the one that attitude and velocity ask for, on either half.
+
+    Where an airframe never slips, the force across it is nearly none: its sign shows in this and in no size.
+    """
+    expected = f.expected
+    half = alternate(len(expected), 10)
+
+    def together(rows: NDArray[np.bool_], axis: int) -> float:
+        pair = [np.clip(x, *np.percentile(x, [2, 98])) for x in (f.force[rows, axis], expected[rows, axis])]
+        lively = len(pair[0]) >= AGAINST_ENOUGH and min(np.std(pair[0]), np.std(pair[1])) > LIVELY
+        return float(np.corrcoef(*pair)[0, 1]) if lively else 0.0
+
+    return [axis for axis in range(3) if max(together(half, axis), together(~half, axis)) < -AGAINST]
 
 
 def _turned_by(M: Array, x: Array) -> Array:
@@ -335,10 +359,13 @@ def field(flight: Flight) -> Iterator[Finding]:
     values = finite_rows(table, ("time_s", *FIELD))
     size = np.median(np.linalg.norm(values[:, 1:], axis=1))
     if not WEAK <= size <= STRONG:
-        units = [unit for unit, factor in other_units("field").items() if 20 <= size * factor <= 80]
-        facts = {"size": size, "units": listed(units or ["another unit, or not what the recipe says"], "or")}
-        causes = tuple(f"magnetometer in {unit}" for unit in units)
-        yield Finding("problem", "magnetometer", FIELD[0], "field-size", facts, causes)
+        units = other_units("field")
+        ways = [unit for unit, factor in units.items() if 20 <= size * factor <= 80]
+        inverse = [unit for unit, factor in units.items() if 20 <= size / factor <= 80]
+        code = "field-unit" if ways else "field-in-ut" if inverse else "field-size"
+        facts = {"size": size, "units": listed(ways or inverse or [""], "or")}
+        causes = tuple(f"magnetometer in {unit}" for unit in ways + inverse)
+        yield Finding("problem", "magnetometer", FIELD[0], code, facts, causes)
         return
     for source in airframe_sources(flight):
         given = field_steps(values, flight.nav[source], _earth(flight))

@@ -19,6 +19,7 @@ from wildlab.flight.checks.findings import (
     phrase,
     thin,
 )
+from wildlab.flight.checks.mistakes import Mistake, blame, change_by, mistake, rows_of
 from wildlab.flight.checks.sightings import MOST
 from wildlab.flight.clocks import frame_poses, frame_times, gimbal_angles, poses_at
 from wildlab.flight.manifest_parts import CameraPart
@@ -33,7 +34,7 @@ FOCAL_RATIO = 0.02
 #: Fields of view (deg) across the image that a camera of a drone may have: long telephoto to fisheye.
 NARROW, WIDE = 1.0, 150.0
 #: Lenses are centred to a few percent of the image; further off, an image was cropped, or it is a mistake.
-OFF_CENTRE = 0.1
+OFF_CENTRE, OFF_FAR, CENTRED = 0.08, 0.2, 0.03
 #: A mark is where something was marked, so its ray goes down: more that do not than this share are a fault.
 LOST = 0.5
 #: Ground heights that differ from those of the truth by more than this (m), by so many times what is stated,
@@ -106,11 +107,26 @@ def lens(flight: Flight) -> Iterator[Finding]:
     elif across < NARROW:
         yield Finding("warning", "flight.toml", "camera.fx_px", "view-narrow", facts)
     c = np.array([camera.cx_px, camera.cy_px])
-    size = np.array([camera.width_px, camera.height_px])
-    # Outside of the image it is said with the calibration.
-    if OFF_CENTRE < np.abs(c / size - 0.5).max() < 0.5:
+    size = np.array([camera.width_px, camera.height_px], float)
+    now = _off_centre(c, size)
+    if now <= OFF_CENTRE:
+        return
+    named: list[Mistake[Any]] = []
+    for row in rows_of("centre"):
+        point, of = change_by(row, size)(c), size[row.get("size_order", [0, 1])]
+        if point is not None and _off_centre(point, of) <= CENTRED:
+            width, height = of / row.get("scale", 1.0)
+            stated = {"cx": point[0], "cy": point[1], "width": width, "height": height}
+            named.append(mistake(row, lambda x: x, fitted=False, **stated))
+    inside = bool(((c > 0) & (c < size)).all())
+    if named or (now > OFF_FAR and inside):  # outside of the image: said with the calibration
         facts = {"cx": c[0], "cy": c[1], "width": size[0], "height": size[1]}
-        yield Finding("warning", "flight.toml", "camera.cx_px", "centre-far", facts)
+        code = "centre-explained" if named else "centre-far"
+        yield blame("warning", "flight.toml", "camera.cx_px", code, named, facts)
+
+
+def _off_centre(point: np.ndarray, of: np.ndarray) -> float:
+    return float(np.abs(point / of - 0.5).max())
 
 
 def ground(flight: Flight) -> Iterator[Finding]:
@@ -175,10 +191,11 @@ def _rays(flight: Flight, pixels: pd.DataFrame, frames: pd.DataFrame) -> Iterato
         lost = 1 - np.isfinite(met[known, 0]).mean()
         if lost > LOST:
             other = "forward" if manifest.mount.looks == "down" else "down"
-            below = bool(np.mean(under[known]) > LOST)
-            facts = {"percent": 100 * lost, "source": name, "other": other, "below": below}
+            below = np.mean(under[known]) > LOST
+            facts = {"percent": 100 * lost, "source": name, "other": other}
+            code = "rays-from-below" if below else "rays-past-ground"
             level: Level = "problem" if lost > 0.9 else "warning"
-            yield Finding(level, f"nav/{name}", "", "rays-past-ground", facts, ("rays miss the ground",))
+            yield Finding(level, f"nav/{name}", "", code, facts, ("rays miss the ground",))
 
 
 #: Poses that far below the ground are said, metres: a terrain's cell rounds the place it takes off from.
@@ -239,6 +256,9 @@ def terrain_findings(flight: Flight) -> Iterator[Finding]:
             level: Level = "problem" if below.all() else "warning"
             facts = {"percent": 100 * below.mean(), "deep": DEEP, "most": -above.min()}
             yield Finding(level, f"nav/{name}", "down_m", "below-ground", facts)
+        elif over.any():
+            facts = {"median": np.median(above), "low": above.min(), "high": above.max()}
+            yield Finding("note", f"nav/{name}", "down_m", "above-ground", facts)
 
 
 def _known_points(flight: Flight, ground: Terrain) -> Iterator[Finding]:
@@ -253,9 +273,10 @@ def _known_points(flight: Flight, ground: Terrain) -> Iterator[Finding]:
         return
     middle = np.median(above)
     spread = 1.4826 * np.median(np.abs(above - middle))
-    if abs(middle) > max(OFF, OFF_SPREAD * spread):
-        facts = {"n": len(above), "above": middle, "spread": spread}
-        yield Finding("warning", "terrain.tif", "", "points-off-ground", facts)
+    off = abs(middle) > max(OFF, OFF_SPREAD * spread)
+    facts = {"n": len(above), "above": middle, "spread": spread}
+    code = "points-off-ground" if off else "points-on-ground"
+    yield Finding("warning" if off else "note", "terrain.tif", "", code, facts)
 
 
 def _length(metres: float) -> str:

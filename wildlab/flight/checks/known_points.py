@@ -4,21 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import Any
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
+from scipy.special import bdtrc
 
-from wildlab.flight.checks.findings import Finding
+from wildlab.flight.checks.findings import POSITION, Finding, number, phrase
 from wildlab.flight.checks.mistakes import (
-    FALL,
-    LIKE_NOISE,
-    Misfit,
+    ALIKE,
+    FAR_BETTER,
+    MOST_NAMED,
+    Change,
     Mistake,
-    Row,
     attitudes_in,
     blame,
     change_by,
+    change_columns,
+    change_geodetic,
     explain,
     mistake,
     one_row,
@@ -32,9 +37,11 @@ from wildlab.flight.checks.mistakes import (
     undo_in,
 )
 from wildlab.flight.checks.sightings import (
+    Missed,
     Sightings,
     glance,
     halves_of,
+    left_over,
     metres,
     misfit,
     missed,
@@ -42,11 +49,19 @@ from wildlab.flight.checks.sightings import (
 )
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.frames import Array, euler_to_matrix, matrix_to_euler
+from wildlab.geometry.frames import Array, Origin, euler_to_matrix, matrix_to_euler
 from wildlab.geometry.mount import R_MC_DOWN, R_MC_FORWARD, Looks, Mount, camera_pose, camera_rotation
+from wildlab.names import listed
 
 #: Without a known mistake, misses this many times what is expected and this large (deg) are still said.
 UNEXPLAINED, UNEXPLAINED_DEG = 4.0, 8.0
+#: A single photo or mark is named where most of its misses are so many times those of all, by at least so
+#: many points, and so many times what is expected.
+SINGLE, SINGLE_POINTS, SINGLE_EXPECTED = 6.0, 2, 5.0
+#: Rays that pass known points by less than this (m) are not told apart.
+CLOSE_M = 0.1
+#: So many photos of a flight in which all is as stated may be named, in the mean.
+BY_CHANCE = 0.05
 #: Heights are looked for this far (m) and clocks this far (s); finer steps near zero.
 HEIGHTS = np.sinh(np.linspace(-7.5, 7.5, 41)) * 2.0
 CLOCKS = np.sinh(np.linspace(-5.0, 5.0, 41)) * 0.8
@@ -54,6 +69,10 @@ HOURS = tuple(h for h in np.arange(-14.0, 14.25, 0.25) if h)
 LEAP_S = (18.0, -18.0, 19.0, -19.0, 37.0, -37.0)
 #: A mount is off by a few degrees and no wrong meaning; beyond the second, a turn is one of the usual ones.
 TURNED_DEG, LARGEST_TURN_DEG, ROUNDS = 5.0, 40.0, 6
+#: Over which misses are differentiated by the clock, either way, s.
+STEP_S = 0.05
+#: Beyond this correlation a clock and a turn of the camera are hard to tell apart.
+HARD = 0.7
 GOLDEN = (np.sqrt(5) - 1) / 2
 #: A lever arm is no longer than this, m.
 LONGEST_LEVER = 5.0
@@ -86,25 +105,60 @@ def judge(flight: Flight, given: Sightings) -> Iterator[Finding]:
         if many is not None and many.others:
             return  # most of what is detected may be of those whose places nobody knows
         yield from nameless(flight, given)
+        if flight.manifest.scoring.rule == "nearest":
+            yield from _single(given)
         return
     named = explain(misfit, given, camera_mistakes(flight, given), glance)
-    # What is expected may change with a mistake, too: metres have to fall as well.
-    named = [one for one in named if metres(one.undone) < metres(given)]
-    table = f"nav/{given.source}"
+    # Misfits are in units of what is expected, which a mistake may change too: metres have to fall as well.
+    named = [
+        one for one in named if _plain(given, one.undone) or metres(one.undone, False) < metres(given, False)
+    ]
     if named:
-        corrections = [
-            correct
-            for one in named
-            for correct in one.corrections or (_stated(one.undone.camera, one.undone.mount),)
-        ]
-        facts = {"before": metres(given), "after": metres(named[0].undone)}
-        yield blame("problem", table, "", "points-explained", named, facts, corrections)
+        yield _finding(given, named)
+        given = named[0].undone
     else:
         m = missed(given)
         angle = np.degrees(np.median(m.angle[m.good])) if m.good.any() else np.nan
         if misfit(given)[0, 0] > UNEXPLAINED and angle > UNEXPLAINED_DEG:
             facts = {"metres": metres(given), "angle": angle}
-            yield Finding("warning", table, "", "points-missed", facts)
+            yield Finding("warning", f"nav/{given.source}", "", "points-missed", facts)
+    yield from _single(given)
+
+
+def _plain(given: Sightings, undone: Sightings) -> bool:
+    """Whether the distance falls by far with nothing else taken off."""
+    return metres(undone) * FAR_BETTER <= metres(given)
+
+
+def _finding(given: Sightings, named: list[Mistake[Sightings]]) -> Finding:
+    # Where other small errors hide what is gained, it is the distance without these that shows it.
+    plain = _plain(given, named[0].undone)
+    # What is as good in angles and leaves ten times the distance explains it less.
+    left = np.nan_to_num([metres(one.undone, plain) for one in named], nan=np.inf)
+    chosen = [
+        (one, off) for one, off in zip(named, left, strict=True) if off <= ALIKE * max(left.min(), CLOSE_M)
+    ]
+    first = chosen[0][0]
+    alike = [f"{one.said} ({number(off)} m)" for one, off in chosen[1:]]
+    return blame(
+        "problem",
+        f"nav/{given.source}",
+        "",
+        "points-explained",
+        [one for one, _ in chosen],
+        {
+            "first": first.said,
+            "plain": plain,
+            "before": metres(given, plain),
+            "after": metres(first.undone, plain),
+            "alike": f"; as well explained: {listed(alike, 'or')}" if alike else "",
+        },
+        [
+            correct
+            for one, _ in chosen
+            for correct in one.corrections or (_stated(one.undone.camera, one.undone.mount),)
+        ],
+    )
 
 
 def _stated(camera: Camera, mount: Mount) -> Callable[[Flight], Flight | None]:
@@ -133,10 +187,40 @@ def camera_mistakes(flight: Flight, s: Sightings) -> Iterator[Mistake[Sightings]
     yield from calibration_mistakes(s)
     yield from places_in(f"nav/{s.source}", s.origin, "poses", "p_nb")
     yield from places_in("truth", s.origin, "truth", "points")
+    yield from shared_place_mistakes(s)
     yield from height_mistakes(s)
     yield from turn_mistakes(s)
     if flight.manifest.time.kind == "utc":
         yield from clock_mistakes(s, flight.manifest.clocks.camera_offset_s)
+
+
+def shared_place_mistakes(s: Sightings) -> Iterator[Mistake[Sightings]]:
+    """Mistakes about latitude and longitude that poses, truth and the origin share: the points stay near, and
+    north lies elsewhere."""
+    for row in rows_of("geodetic"):
+        change = change_by(row)
+        there = change(np.array(s.origin))
+        if there is None or abs(there[0]) > np.pi / 2:
+            continue
+        at: Origin = tuple(there.tolist())
+        moved = partial(change_geodetic, change, origin=s.origin, to=at)
+
+        def undo(x: Sightings, moved: Change = moved, at: Origin = at) -> Sightings | None:
+            done = undo_in(moved, "p_nb", "points")(x)
+            return None if done is None else replace(done, origin=at)
+
+        def correct(flight: Flight, moved: Change = moved, at: Origin = at) -> Flight | None:
+            placed = [one for one in ("gnss", "truth") if one in flight.tables]
+            for table in (*(f"nav/{name}" for name in flight.nav), *placed):
+                changed = change_columns(table, POSITION, moved)(flight)
+                if changed is None:
+                    return None
+                flight = changed
+            latitude, longitude = np.degrees(at[:2]).tolist()
+            return state({"origin": {"latitude_deg": latitude, "longitude_deg": longitude}})(flight)
+
+        of = mistake(row, undo, part=f"poses.{s.source}.position] and [truth")
+        yield of.within("poses and truth", undo, correct)
 
 
 # -- mount, pixels and calibration
@@ -294,34 +378,94 @@ def _weight(size: Array) -> Array:
     return 1 / (1 + (size / (2 * max(np.median(size), 1e-9))) ** 2)
 
 
-def clock_mistake(
-    row: Row, source: str, by: float, offset_s: float, fitted: bool = False, **facts: Any
-) -> Mistake[Sightings]:
-    """A camera's clock that is off by so many seconds; `offset_s` is what the manifest has."""
-    corrections = (shift_clock("camera_offset_s", by), shift_poses(source, -by))
-    facts |= {"by": by, "offset": offset_s + by}
-    return mistake(row, lambda x: x.shifted(by), *corrections, fitted=fitted, **facts)
+class OffsetFit(NamedTuple):
+    """How well an offset of the clock is known: its standard deviation (s) from image to image, a turn of the
+    camera being as free, and the multiple correlation of the two, 0 to 1."""
+
+    sd_s: float
+    correlation: float
+
+
+def clock_fit(s: Sightings, by: float) -> OffsetFit | None:
+    """How well an offset of the camera's clock is known beside a turn of the camera.
+
+    Least squares of the misses about the offset, linear in it and in three small turns; what images share
+    is allowed for by taking each as one.
+
+    Parameters
+    ----------
+    s
+        The sightings as they are.
+    by
+        The offset, s.
+
+    Returns
+    -------
+    OffsetFit or None
+        None where the sightings do not determine it.
+    """
+    m, before, after = (missed(s.shifted(by + step)) for step in (0.0, -STEP_S, STEP_S))
+    rows = m.good & before.good & after.good
+    if rows.sum() < 8:
+        return None
+    e, late = m.turn[rows], (before.turn - after.turn)[rows] / (2 * STEP_S)
+    J = np.concatenate([m.across[rows], late[:, :, None]], axis=2)
+    weight = _weight(np.linalg.norm(e, axis=1))
+    A = np.einsum("nia,n,nib->ab", J, weight, J)
+    image = np.unique(s.image[rows], return_inverse=True)[1]
+    if image.max() < 5 or np.linalg.cond(A) > 1e12:
+        return None
+    C = np.linalg.inv(A)
+    left = e - J @ (C @ np.einsum("nia,n,ni->a", J, weight, e))
+    score = np.zeros((image.max() + 1, 4))
+    np.add.at(score, image, np.einsum("nia,n,ni->na", J, weight, left))
+    n = len(score)
+    variance = float((C @ (score.T @ score) @ C)[3, 3]) * n / (n - 4)
+    return OffsetFit(float(np.sqrt(variance)), float(np.sqrt(max(0.0, 1 - 1 / (A[3, 3] * C[3, 3])))))
+
+
+def _interval(row: Any, s: Sightings, by: float) -> str:
+    """The interval of an offset of the clock, and what it is hard to tell from; nothing if not known.
+
+    Noise of poses that is new at each of them is least half-way between two: where images come as regularly
+    as poses, the offset that fits best lies there, up to half of the time between two poses from the true.
+    """
+    found = clock_fit(s, by)
+    if found is None:
+        return ""
+    wide = 1.96 * found.sd_s + s.between_s / 2
+    facts = {"low": abs(by) - wide, "high": abs(by) + wide, "correlation": found.correlation}
+    return phrase(row["interval"], {**facts, "hard": found.correlation > HARD})
 
 
 def clock_mistakes(s: Sightings, offset_s: float) -> Iterator[Mistake[Sightings]]:
-    """A constant by which the camera's clock is late or early."""
+    """A constant by which the camera's clock is late or early; `offset_s` is what the manifest has."""
+
+    def clock(row: Any, by: float, fitted: bool = False, **facts: Any) -> Mistake[Sightings]:
+        corrections = (shift_clock("camera_offset_s", by), shift_poses(s.source, -by))
+        facts |= {"by": by, "offset": offset_s + by}
+        return mistake(row, lambda x: x.shifted(by), *corrections, fitted=fitted, **facts)
+
     by = best_of(lambda t: _cost(s.shifted(t)), CLOCKS)
     if abs(by) > 0.05:
-        yield clock_mistake(one_row("camera-clock"), s.source, by, offset_s, fitted=True)
+        row = one_row("camera-clock")
+        yield clock(row, by, fitted=True, interval=_interval(row, s, by))
     for seconds in LEAP_S:
-        yield clock_mistake(one_row("leap-seconds"), s.source, seconds, offset_s)
+        yield clock(one_row("leap-seconds"), seconds)
     for hours in HOURS:
-        zone = clock_mistake(one_row("zone"), s.source, 3600.0 * hours, offset_s, hours=hours)
-        yield replace(zone, corrections=())
+        yield replace(clock(one_row("zone"), 3600.0 * hours, hours=hours), corrections=())
 
 
 # -- pixels without names
 
 #: A ray meets a target that it passes by no more than so many times what is expected, and no more than this.
 MEETS, MEETS_DEG = 3.0, 6.0
-#: Undone, a mistake has to bring this share of rays to a target, which where all is right needs no
-#: explanation; a clock that was chosen to make it fit, so many times as many.
-LEAST, BY_CLOCK = 0.3, 4.0
+#: Undone, a mistake has to bring so many times as many rays to a target, on the whole and on either half, and
+#: this share at least, which where all is right needs no explanation; where a number was chosen to make it
+#: fit, twice as many times.
+MORE, LEAST = 2.0, 0.3
+#: Mistakes are named together whose shares are so near each other.
+ALIKE_SHARE = 0.9
 #: Clocks that are looked for, s.
 NAMELESS_CLOCKS = np.arange(-30.0, 30.5, 0.5)
 
@@ -349,17 +493,25 @@ def nameless(flight: Flight, given: Sightings) -> Iterator[Finding]:
     given
         Pixels without names, with all known targets.
     """
-
-    def too_few(s: Sightings) -> Misfit:
-        # What is left is like noise from `LEAST` on; of a share below that none is far better.
-        return np.tile(LIKE_NOISE * LEAST / np.maximum(shares(s), LEAST / FALL), (2, 1))
-
-    share = shares(given)[0]
-    named = explain(too_few, given, _nameless_mistakes(flight, given)) if share < LEAST else []
-    if named:
-        then = " or ".join(f"{100 * shares(one.undone)[0]:.0f} % were if {one.said}" for one in named)
-        facts = {"share": 100 * share, "then": then}
-        yield blame("warning", f"nav/{given.source}", "", "few-meet-a-target", named, facts, [])
+    before = shares(given)
+    if before[0] >= LEAST:
+        return
+    found: list[tuple[bool, float, Mistake[Sightings]]] = []
+    for one in _nameless_mistakes(flight, given):
+        undone = one.undo(given)
+        if undone is not None:
+            after = shares(undone)
+            more = MORE**2 if one.fitted else MORE
+            if after[0] >= LEAST and (after >= more * before).all():
+                found.append((one.fitted, -after[0], one))
+    best = min((less for _, less, _ in found), default=0.0)
+    alike = sorted((one for one in found if one[1] <= ALIKE_SHARE * best), key=lambda one: one[:2])
+    if alike:
+        named = alike[:MOST_NAMED]
+        then = " or ".join(f"{-100 * less:.0f} % were if {one.said}" for _, less, one in named)
+        facts = {"share": 100 * before[0], "then": then}
+        mistakes = [one for _, _, one in named]
+        yield blame("warning", f"nav/{given.source}", "", "few-meet-a-target", mistakes, facts, [])
 
 
 def _nameless_mistakes(flight: Flight, s: Sightings) -> Iterator[Mistake[Sightings]]:
@@ -367,7 +519,57 @@ def _nameless_mistakes(flight: Flight, s: Sightings) -> Iterator[Mistake[Sightin
     yield from attitudes_in(s.source, "", "R_nb")
     yield from pixel_mistakes(s)
     by = best_of(lambda t: -float(shares(s.shifted(t)).min()), NAMELESS_CLOCKS)
-    far_more = (shares(s.shifted(by)) >= BY_CLOCK * shares(s)).all()
-    if flight.manifest.time.kind == "utc" and abs(by) >= 1.0 and far_more:
-        offset_s = flight.manifest.clocks.camera_offset_s
-        yield clock_mistake(one_row("camera-clock"), s.source, by, offset_s, fitted=True)
+    if flight.manifest.time.kind == "utc" and abs(by) >= 1.0:
+        offset = flight.manifest.clocks.camera_offset_s + by
+        row = one_row("camera-clock-nameless")
+        yield mistake(row, lambda x: x.shifted(by), fitted=True, by=by, offset=offset)
+
+
+# -- one photo or mark
+
+
+def _single(s: Sightings) -> Iterator[Finding]:
+    """One photo, or one mark, that is off while the others are not."""
+    m = missed(s)
+    good = m.good
+    if good.sum() < 8:
+        return
+    angle = left_over(m, good)
+    size = angle / m.expected
+    # What is expected takes the mean of the angles; one photo may be off by the one that is known least.
+    least = np.sqrt(m.expected**2 - s.sd[:, 0] ** 2 + s.sd[:, 3] ** 2)
+    for what, names, table, field in (
+        ("photo", s.frames, "frames", "frame_id"),
+        ("mark", s.labels, "truth", "target_id"),
+    ):
+        count = len(set(names))
+        most = np.sqrt(2 * np.log(max(count, 1) / BY_CHANCE))
+        far = (size > SINGLE * np.median(size[good])) & (size > SINGLE_EXPECTED)
+        off = _off(far & (angle > most * least), names, good)
+        if off and len(off) <= max(1, count // 5):
+            facts = {"source": s.source, "n": len(off), "which": [_turned(m, names, one) for one in off[:5]]}
+            yield Finding("warning", table, field, f"one-{what}-off", facts, (f"one {what} off",))
+
+
+def _turned(m: Missed, names: NDArray[np.object_], name: str) -> str:
+    angle = float(np.degrees(np.nanmedian(m.angle[names == name])))
+    return f"{name!r} ({number(angle)} deg)"
+
+
+def _off(far: NDArray[np.bool_], names: NDArray[np.object_], good: NDArray[np.bool_]) -> list[str]:
+    """Those whose points are for the most part far, where so many of them are hardly together by chance.
+
+    Far ones are everywhere: wrong clicks, and detections of what is no known point.
+    """
+    rows = {str(name): (names == name) & good for name in dict.fromkeys(names) if name != ""}
+    rows = {name: of for name, of in rows.items() if of.sum() >= SINGLE_POINTS}
+    # More than half of them: one wrong click is not a wrong photo.
+    off = [name for name, of in rows.items() if far[of].mean() > 0.5]
+    others = good & ~np.isin(names.astype(str), off)
+    # As if there had been half a far one more, so that none seen is not none ever.
+    share = (far[others].sum() + 0.5) / (others.sum() + 1)
+
+    def by_chance(of: NDArray[np.bool_]) -> float:
+        return len(rows) * float(bdtrc(far[of].sum() - 1, of.sum(), share))
+
+    return [name for name in off if by_chance(rows[name]) < BY_CHANCE]

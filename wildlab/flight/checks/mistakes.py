@@ -458,15 +458,15 @@ def _by_angles(row: Row) -> Change:
     return undo
 
 
-def change_geodetic(change: Change, p: Array, origin: Origin) -> Array | None:
-    """Positions (N, 3) whose latitude, longitude and height are changed."""
+def change_geodetic(change: Change, p: Array, origin: Origin, to: Origin | None = None) -> Array | None:
+    """Positions (N, 3) whose latitude, longitude and height are changed, about another origin or the same."""
     changed = change(ned_to_geodetic(p, origin))
     if changed is None:
         return None
     lat, lon, height = np.moveaxis(changed, -1, 0)
     with np.errstate(invalid="ignore"):
         off_earth = (np.abs(lat) > np.pi / 2).any() or (np.abs(lon) > 2 * np.pi).any()
-    return None if off_earth else geodetic_to_ned(lat, lon, height, origin)
+    return None if off_earth else geodetic_to_ned(lat, lon, height, to or origin)
 
 
 def place_mistakes(part: str, origin: Origin, local: bool = True) -> Iterator[Mistake[Array]]:

@@ -24,7 +24,6 @@ from wildlab.flight.checks.findings import (
     Level,
     finite_rows,
     part_of,
-    phrase,
     thin,
 )
 from wildlab.flight.checks.inertial import fixes, increasing_rows, intervals
@@ -302,7 +301,8 @@ def position_mistakes(flight: Flight, source: str, pair: PositionPair) -> Iterat
 
 # -- leaps of a position: a jump of the fix, or a filter that began anew, which a clock would seem to explain
 
-#: A leap is at least so long (m), and so many of the usual spreads of a stretch of so many s.
+#: A leap is over within so many seconds, at least so long (m), and so many of the usual spreads of a stretch
+#: as long.
 WITHIN_S, LEAST_M, FAR = 2.0, 5.0, 8.0
 #: Places so long before and after it (s) say how far it went.
 BESIDE_S = 5.0
@@ -357,11 +357,16 @@ def find_leaps(table: pd.DataFrame, name: str = "") -> list[Leap]:
     unexplained = np.where(step > max(WITHIN_S, 3 * np.median(step)), 0.0, gone - expected)
     left = np.concatenate([np.zeros((1, 3)), np.cumsum(unexplained, axis=0)])
     end = np.minimum(np.searchsorted(t, t + WITHIN_S), len(t) - 1)
-    limit = max(LEAST_M, FAR * np.median(np.linalg.norm(left[end] - left, axis=1)))
+    size = np.linalg.norm(left[end] - left, axis=1)
+    limit = max(LEAST_M, FAR * np.median(size))
     found: list[Leap] = []
-    for row in np.flatnonzero(np.linalg.norm(unexplained, axis=1) > limit) + 1:
-        before = left[(t >= t[row - 1] - BESIDE_S) & (t < t[row])]
-        after = left[(t >= t[row]) & (t <= t[row] + BESIDE_S)]
+    # The first row of each run of stretches that are too long is as much before the leap as a stretch is.
+    rows = np.flatnonzero(size > limit)
+    for run in np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1) if len(rows) else []:
+        first, last = int(run[0]), int(end[run[-1]])
+        row = first + int(np.argmax(np.linalg.norm(unexplained[first:last], axis=1))) + 1
+        before = left[(t >= t[first] - BESIDE_S) & (t <= t[first])]
+        after = left[(t >= t[last]) & (t <= t[last] + BESIDE_S)]
         by = np.median(after, axis=0) - np.median(before, axis=0)
         # What comes back at once is a stray place.
         if np.linalg.norm(by) > limit:
@@ -426,20 +431,22 @@ def origin(flight: Flight) -> Iterator[Finding]:
     away = _level(at)
     if away < FAR_AWAY:
         return
-    stated = flight.manifest.origin_tuple()
+    o, stated = flight.manifest.origin, flight.manifest.origin_tuple()
     here = ned_to_geodetic(at, stated)
     ways = {}
-    for row in rows_of("geodetic"):
-        right = change_by(row)(np.array(stated))
-        if right is None or abs(right[0]) > np.pi / 2:
-            continue
-        if _level(geodetic_to_ned(here[0], here[1], here[2], tuple(right.tolist()))) < FAR_AWAY:
-            latitude, longitude = np.degrees(right[:2])
-            write = f"`latitude_deg = {latitude:g}, longitude_deg = {longitude:g}` in [origin]"
-            ways[f"origin: {phrase(row['cause'], row)}"] = f"write {write}"
+    for key, lat, lon in (
+        ("latitude and longitude of the origin exchanged", o.longitude_deg, o.latitude_deg),
+        ("latitude of the origin negated", -o.latitude_deg, o.longitude_deg),
+        ("longitude of the origin negated", o.latitude_deg, -o.longitude_deg),
+        ("latitude and longitude of the origin negated", -o.latitude_deg, -o.longitude_deg),
+    ):
+        there = (float(np.radians(lat)), float(np.radians(lon)), o.height_m)
+        if abs(lat) <= 90 and _level(geodetic_to_ned(here[0], here[1], here[2], there)) < FAR_AWAY:
+            ways[key] = f"write `latitude_deg = {lat:g}, longitude_deg = {lon:g}` in [origin]"
     shown = flight.manifest.locations.sensitivity == "open"
     facts = {
         "km": away / 1e3,
+        "angle": turned(at, stated),
         "named": "; ".join(ways),
         "open": shown,
         "ways": " or ".join(ways.values() if shown else ways),
@@ -451,6 +458,23 @@ def origin(flight: Flight) -> Iterator[Finding]:
 
 def _level(at: Array) -> float:
     return float(np.hypot(*at[:2]))
+
+
+def turned(at: Array, origin: Origin) -> float:
+    """How far level and north at a place (3,) in n are turned against those of the origin, degrees.
+
+    Examples
+    --------
+    >>> print(f"{turned(np.array([111_000.0, 0.0, 0.0]), (0.0, 0.0, 0.0)):.2f}")
+    1.00
+    """
+    p = np.asarray(at, float)[None]
+    latitude, longitude, height = ned_to_geodetic(p, origin)[0]
+    north = geodetic_to_ned(latitude + 1e-6, longitude, height, origin) - p[0]
+    up = geodetic_to_ned(latitude, longitude, height + 10.0, origin) - p[0]
+    north, down = north / np.linalg.norm(north), -up / np.linalg.norm(up)
+    R = np.stack([north, np.cross(down, north), down])
+    return float(np.degrees(np.arccos(np.clip((np.trace(R) - 1) / 2, -1, 1))))
 
 
 def middles(flight: Flight) -> dict[str, Array]:

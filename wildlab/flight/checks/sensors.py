@@ -6,7 +6,7 @@ look counts alike, so that one full of clutter says no more than the others.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,11 +17,13 @@ from wildlab.errors import WildlabError
 from wildlab.flight.checks.findings import POSITION, Finding, Level, thin
 from wildlab.flight.checks.mistakes import (
     ALIKE,
+    FAR_BETTER_ALONE,
     Misfit,
     Mistake,
     blame,
     change_by,
     explain,
+    far_better,
     mistake,
     one_row,
     place_mistakes,
@@ -45,8 +47,11 @@ CLOCKS = (*np.arange(-75.0, 76.0, 1.5), -3600.0, 3600.0, -7200.0, 7200.0)
 #: Turns that are looked for, deg: what declination, compasses and mountings are off by. At either end it is
 #: no constant of some degrees, but the flank of something else.
 TURNS = np.arange(-20.0, 20.5, 0.5)
-#: What a heading that is off is called.
-TURNED = "heading off"
+#: So many standard deviations of what looks differ by, another explanation has to be better by.
+CLEARLY = 2.0
+#: What is seen this near (m) to a target may be of it; a constant offset is at least so large, and holds for
+#: at least this share of it and so many detections.
+AROUND_M, OFF_M, SHARE, ENOUGH_AROUND = 60.0, 15.0, 0.4, 30
 
 
 def looks_of_others(frames: pd.DataFrame, detections: pd.DataFrame) -> pd.DataFrame:
@@ -253,30 +258,31 @@ def scans(flight: Flight) -> Iterator[Finding]:
     given = scans_of(flight)
     if not given:
         return
-    named = explain(misfit, given, common_mistakes(flight, given))
+    named = explain(misfit, given, common_mistakes(flight))
     of_each = [explain(misfit, (one,), source_mistakes(one, _clock(flight, one.source))) for one in given]
     # Each source as its own mistakes leave it, where it has any.
     undone = tuple(own[0].undone[0] if own else one for one, own in zip(given, of_each, strict=True))
+    turn = best_turn(given, [*(one.undone for one in named), *([undone] if any(of_each) else [])])
+    if turn is not None:
+        yield _turned_finding(given, turn)
+        return
     # What concerns all is simpler; but it is not it where the sources' own mistakes explain far more.
     if named and misfit(named[0].undone)[0, 0] <= ALIKE * misfit(undone)[0, 0]:
-        yield _explained("scans-explained", "truth", "", given, named)
+        facts = {"share": _percent(given), "then": _percent(named[0].undone)}
+        yield blame("problem", "truth", "", "scans-explained", named, facts, [])
         return
     for one, own in zip(given, of_each, strict=True):
-        if own:
+        turn = best_turn((one,), [way.undone for way in own])
+        if turn is not None:
+            yield _turned_finding((one,), turn)
+        elif own:
+            then = {"share": _percent((one,)), "then": _percent(own[0].undone), "source": one.source}
             field = "north_m" if one.places is not None else "azimuth_rad"
-            yield _explained("source-explained", "detections", field, (one,), own)
+            yield blame("problem", "detections", field, "source-explained", own, then, [])
 
 
-def _explained(code: str, table: str, field: str, given: Scans, named: list[Mistake[Scans]]) -> Finding:
-    facts = {"share": _percent(given), "then": _percent(named[0].undone), "source": given[0].source}
-    # Where no unit, axis or clock explains it, a compass that is off is no wrong meaning.
-    level: Level = "warning" if named[0].cause == TURNED else "problem"
-    return blame(level, table, field, code, named, facts, [])
-
-
-def common_mistakes(flight: Flight, given: Scans) -> Iterator[Mistake[Scans]]:
-    """Mistakes about the truth, about the own place, about clocks, and a heading that is off."""
-    yield from turn_mistakes(given)
+def common_mistakes(flight: Flight) -> Iterator[Mistake[Scans]]:
+    """Mistakes about the truth, about the own place, and about clocks."""
     for part, field in (("truth", "targets"), (f"poses.{next(iter(flight.nav))}", "own")):
         for place in place_mistakes(part, flight.manifest.origin_tuple()):
             if place.about != "height":
@@ -318,7 +324,6 @@ def source_mistakes(one: SourceLooks, offset_s: float = 0.0) -> Iterator[Mistake
     offset_s
         That offset.
     """
-    yield from turn_mistakes((one,))
     # The clock of the sensor alone: what it saw stays, and all else is where it was at other times.
     by = min(CLOCKS, key=lambda t: misfit((one.with_stamps(t),))[0, 0])
     if by != 0:
@@ -341,22 +346,39 @@ def _from_bow(change: Callable[[Array], Array | None], times: float) -> Callable
 # -- a constant turn of all that a sensor sees, as of a compass or a mounting that is off by some degrees
 
 
-def turn_mistakes(given: Scans) -> Iterator[Mistake[Scans]]:
-    """The turn that brings what is seen to the targets, where it is one of some degrees."""
+def best_turn(given: Scans, rivals: Sequence[Scans]) -> float | None:
+    """The turn (deg, clockwise) that brings what is seen to the targets.
 
-    def turned(given: Scans, by: float) -> Scans:
+    Parameters
+    ----------
+    given
+        The looks of all sources that are turned alike.
+    rivals
+        The same as other explanations have them.
+
+    Returns
+    -------
+    float or None
+        None where no turn brings far more of it to a target, or where a rival does clearly more.
+    """
+    before = misfit(given)
+    if not before[0, 0] > 1.0:
+        return None
+
+    def turned(by: float) -> Scans:
         return tuple(s.turned(by) for s in given)
 
     # All within the gate of a bearing fit alike: the middle of these.
-    k = int(np.argmin([misfit(turned(given, by))[0, 0] for by in TURNS]))
+    k = int(np.argmin([misfit(turned(by))[0, 0] for by in TURNS]))
     by = float(TURNS[k])
     if k in (0, len(TURNS) - 1):
-        return
+        return None
     for _ in range(3):
-        by += float(np.degrees(np.median(np.concatenate([_off(s) for s in turned(given, by)]))))
-    facts = {"turn": by, "heading": -by, "names": listed([s.source for s in given])}
-    facts["first"] = given[0].source
-    yield mistake(one_row("heading"), lambda x: turned(x, by), fitted=True, **facts)
+        by += float(np.degrees(np.median(np.concatenate([_off(s) for s in turned(by)]))))
+    done = turned(by)
+    if not far_better(before, misfit(done), fitted=True):
+        return None
+    return None if any(_clearly_more(other, done) for other in rivals) else by
 
 
 def _off(s: SourceLooks) -> Array:
@@ -366,3 +388,75 @@ def _off(s: SourceLooks) -> Array:
     off = wrap(np.arctan2(away[..., 1], away[..., 0]) - s.seen_at[good])
     off = np.where(np.isfinite(off), off, np.inf)
     return np.asarray(np.take_along_axis(off, np.abs(off).argmin(axis=0)[None], axis=0)[0])
+
+
+def _clearly_more(one: Scans, other: Scans) -> bool:
+    """Whether more of what is seen is at a target in `one`, by more than looks differ by chance."""
+    more = np.concatenate([shares(a) - shares(b) for a, b in zip(one, other, strict=True)])
+    return bool(more.mean() > CLEARLY * more.std() / np.sqrt(len(more)))
+
+
+def _turned_finding(given: Scans, turn_deg: float) -> Finding:
+    first = given[0]
+    facts = {
+        "share": _percent(given),
+        "then": _percent(tuple(s.turned(turn_deg) for s in given)),
+        "turn": turn_deg,
+        "heading": -turn_deg,
+        "names": listed([s.source for s in given]),
+        "first": first.source,
+    }
+    field = "azimuth_rad" if first.azimuth is not None else "north_m"
+    return Finding("warning", "detections", field, "sensors-turned", facts, ("heading off",))
+
+
+# -- one target whose truth is off: other sensors see it beside where it is said to be
+
+
+def offset_of(away: Array) -> tuple[Array, float, float]:
+    """Where most of what is seen around a target lies: the offset (2,) m, and the shares there and at it.
+
+    Parameters
+    ----------
+    away
+        (N, 2): detections less the target, m, all of them near.
+
+    Returns
+    -------
+    The offset, the share of detections near it, and the share near the target itself.
+
+    Examples
+    --------
+    >>> offset, there, here = offset_of(np.array([[25.0, 0.0]] * 40 + [[-30.0, 9.0]] * 10))
+    >>> print(offset, there, here)
+    [25.  0.] 0.8 0.0
+    """
+    near = np.linalg.norm(away[:, None] - away[None], axis=2) < NEAR_M
+    centre = away[int(np.argmax(near.sum(axis=1)))]
+    for _ in range(3):
+        centre = away[np.linalg.norm(away - centre, axis=1) < NEAR_M].mean(axis=0)
+    there = float(np.mean(np.linalg.norm(away - centre, axis=1) < NEAR_M))
+    return centre, there, float(np.mean(np.linalg.norm(away, axis=1) < NEAR_M))
+
+
+def targets(flight: Flight) -> Iterator[Finding]:
+    """Every target against the sources of positions."""
+    scans = [one for one in scans_of(flight) if one.places is not None]
+    if flight.truth is None:
+        return
+    for k, name in enumerate(dict.fromkeys(flight.truth["target_id"])):
+        for scan in scans:
+            level = (scan.targets - np.asarray(scan.places))[..., :2]
+            others = np.linalg.norm(level, axis=2)
+            with np.errstate(invalid="ignore"):
+                nearest = np.nanmin(np.where(np.isfinite(others), others, np.inf), axis=0)
+                own = (nearest == others[k]) & (others[k] < AROUND_M)
+            if own.sum() < ENOUGH_AROUND:
+                continue
+            offset, there, here = offset_of(-level[k, own])
+            size = np.hypot(*offset)
+            if size > OFF_M and there > SHARE and there > FAR_BETTER_ALONE * max(here, 0.01):
+                seen = {"there": 100 * there, "here": 100 * here, "size": size}
+                facts = {"source": scan.source, "name": name, **seen}
+                yield Finding("warning", "truth", "target_id", "target-beside", facts, ("one mark off",))
+                break

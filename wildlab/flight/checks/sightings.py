@@ -64,16 +64,20 @@ class Sightings:
     image
         (N,) number of the image, in the order of time.
     sd
-        (N, 3): expected standard deviations of the attitude (rad, the mean of its angles), the position (m),
-        and the click (px).
+        (N, 4): expected standard deviations of the attitude (rad, the mean of its angles), the position (m),
+        and the click (px); and of the angle that is known least (rad).
     origin
         Of frame n.
     looked
         Poses, angles of the gimbal and known points as they were a shift in seconds later.
+    labels, frames
+        (N,) name of the point, (N,) name of the image.
     own_gimbal
         Whether its angles are the log's.
     named
         Whether it is said of which point each is.
+    between_s
+        Time from one logged pose to the next, s.
     """
 
     source: str
@@ -89,8 +93,11 @@ class Sightings:
     sd: Array
     origin: Origin
     looked: Callable[[float], SightingGeometry]
+    labels: NDArray[np.object_]
+    frames: NDArray[np.object_]
     own_gimbal: bool = False
     named: bool = True
+    between_s: float = 0.0
 
     def take(self, rows: NDArray[np.bool_]) -> Sightings:
         """Some of the rows; the poses at other times go with them."""
@@ -100,7 +107,7 @@ class Sightings:
             p, R, pan, tilt = (value[rows] for value in (at.p_nb, at.R_nb, at.pan, at.tilt))
             return SightingGeometry(p, R, at.points[:, rows], pan, tilt)
 
-        names = ("pan", "tilt", "uv", "p_nb", "R_nb", "image", "sd")
+        names = ("pan", "tilt", "uv", "p_nb", "R_nb", "image", "sd", "labels", "frames")
         taken = {name: getattr(self, name)[rows] for name in names}
         return replace(self, points=self.points[:, rows], looked=looked, **taken)
 
@@ -178,8 +185,11 @@ def sightings(flight: Flight, source: str) -> Sightings | None:
         sd=_expected(flight, P, len(chosen)),
         origin=manifest.origin_tuple(),
         looked=looked,
+        labels=np.full(len(chosen), "", object) if labels is None else labels,
+        frames=ids.to_numpy(object),
         own_gimbal=flight.gimbal is not None or "pan_rad" in frames,
         named=named,
+        between_s=float(np.median(np.diff(nav["time_s"]))) if len(nav) > 1 else 0.0,
     )
     known = np.isfinite(at.p_nb).all(axis=1) & np.isfinite(at.R_nb).all(axis=(1, 2))
     known &= np.isfinite(at.points).all(axis=2).any(axis=0) & np.isfinite(at.pan + at.tilt)
@@ -203,13 +213,14 @@ def _expected(flight: Flight, P: Array | None, n: int) -> Array:
     turns = [USUAL_ATTITUDE if angle is None else np.radians(angle) for angle in angles]
     level = stated.position_horizontal_m or USUAL_HORIZONTAL
     place = np.hypot(level, stated.position_vertical_m or USUAL_VERTICAL) / np.sqrt(2)
-    sd = np.tile([np.mean(turns), place, stated.pixel_px or USUAL_PIXEL], (n, 1))
+    sd = np.tile([np.mean(turns), place, stated.pixel_px or USUAL_PIXEL, max(turns)], (n, 1))
     if P is not None:
         with np.errstate(invalid="ignore"):
             own = np.sqrt(np.diagonal(P, axis1=1, axis2=2))
         good = np.isfinite(own).all(axis=1)
         sd[good, 0], sd[good, 1] = own[good, 3:].mean(axis=1), own[good, :3].mean(axis=1)
-    sd[:, 0] = np.maximum(sd[:, 0], LEAST_ATTITUDE)
+        sd[good, 3] = own[good, 3:].max(axis=1)
+    sd[:, [0, 3]] = np.maximum(sd[:, [0, 3]], LEAST_ATTITUDE)
     return sd
 
 
@@ -334,11 +345,12 @@ def halves_of(groups: NDArray[np.intp]) -> tuple[NDArray[np.bool_], NDArray[np.b
     return first, ~first
 
 
-def metres(s: Sightings) -> float:
+def metres(s: Sightings, plain: bool = True) -> float:
     """Median distance (m) by which the rays pass the known points, all of it for points behind the lens;
-    small constant errors of mount and position are taken off."""
+    as it is, or with small constant errors of mount and position taken off."""
     m = missed(s)
     good = m.good
     if not good.any():
         return float("nan")
-    return float(np.median((m.distance * np.sin(np.minimum(left_over(m, good), np.pi / 2)))[good]))
+    angle = m.angle if plain else left_over(m, good)
+    return float(np.median((m.distance * np.sin(np.minimum(angle, np.pi / 2)))[good]))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+from collections import Counter
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
@@ -34,8 +35,10 @@ FAR_M = 20_000.0
 NAMES = ("detection_id", "target_id")
 #: One clicked twice now and then is worth a word; this share of all is a file that was read twice.
 FEW = 0.01
-#: So many that stand there again, and so large a share, are a log, or a part of one, that was read twice.
-ENOUGH, PART = 10, 0.1
+#: So many detections of one source, and so large a share of them, are never by chance those of another one.
+ENOUGH, MOST = 10, 0.5
+#: So large a share that stands there again is a log, or a part of one, that was read twice.
+PART = 0.1
 
 
 def schemas(flight: Flight) -> Iterator[tuple[str, Table, pd.DataFrame]]:
@@ -195,15 +198,32 @@ def identity(flight: Flight) -> Iterator[Finding]:
 
 
 def duplicates(flight: Flight) -> Iterator[Finding]:
-    """Detections of one look that are alike in all that was measured: how many of how many, and the first."""
+    """Detections that are alike in all that was measured: in one look, or of another look at the same time.
+
+    Parameters
+    ----------
+    flight
+        The flight.
+
+    Yields
+    ------
+    Finding
+        Of one look, with how many of how many stand there again, and the first; and one for each source that
+        says what another one says, as a log that was read under two names.
+    """
     detections = flight.detections
     if detections is None or not len(detections):
         return
     measured = [name for name in detections.columns if name not in NAMES]
     # Without a look, equal values may be of two times.
     again = detections.duplicated(measured).to_numpy() & (detections["frame_id"] != "").to_numpy()
-    if not again.any():
-        return
+    if again.any():
+        yield _in_one_look(detections, again)
+    else:
+        yield from _in_other_looks(flight, detections)
+
+
+def _in_one_look(detections: pd.DataFrame, again: NDArray[np.bool_]) -> Finding:
     rows = detections.loc[again]
     n, of, first = len(rows), len(detections), rows.iloc[0]
     level: Level = "warning" if n > FEW * of else "note"
@@ -211,13 +231,38 @@ def duplicates(flight: Flight) -> Iterator[Finding]:
         level = "problem"
     facts = {"n": n, "of": of, "looks": rows["frame_id"].nunique()}
     facts |= {"first": first["detection_id"], "frame": first["frame_id"]}
-    yield Finding(level, "detections", "detection_id", "alike-in-one-look", facts)
+    return Finding(level, "detections", "detection_id", "alike-in-one-look", facts)
+
+
+def _in_other_looks(flight: Flight, detections: pd.DataFrame) -> Iterator[Finding]:
+    frames = flight.frames
+    if frames is None or flight.manifest.time.kind != "utc":
+        return
+    at = frames.drop_duplicates("frame_id").set_index("frame_id")["time_s"]
+    looks = detections.assign(frame_id=detections["frame_id"].map(at)).dropna(subset=["frame_id"])
+    measured = [name for name in looks.columns if name not in (*NAMES, "source")]
+    # Answers of several programs to the same pixels may well be the same.
+    if bool((detections["kind"] == "pixel").any()):
+        looks = looks.loc[(looks["kind"] != "position").to_numpy()]
+    again = looks.duplicated(measured, keep=False)
+    if not again.any():
+        return
+    groups = looks.loc[again].groupby(measured, dropna=False)["source"]
+    count_of = Counter(tuple(sorted(set(rows))) for _, rows in groups)
+    for names, count in count_of.items():
+        first, last = names[0], names[-1]
+        of = min(int((looks["source"] == name).sum()) for name in names) // (1 if len(names) > 1 else 2)
+        if count >= ENOUGH and count >= MOST * of:
+            facts = {"n": count, "of": of, "first": first, "last": last, "one": first == last}
+            yield Finding("problem", "detections", "source", "read-twice", facts)
 
 
 #: Logs do not begin and end together: fewer frames outside than this share are good to know, no more.
 FEW_OUTSIDE = 0.02
 #: Logs that begin within so many seconds of each other, and end so, were switched on and off together.
 TOGETHER_S = 5.0
+#: Zones differ by whole quarters of an hour; so near to one (s), with logs that do not begin at once.
+QUARTER_S, NEAR_QUARTER_S = 900.0, 60.0
 #: More names, or gaps, than this are counted and not listed.
 LISTED = 5
 #: Share of the shorter that has to lie within the longer, and what it may be less while clocks are in doubt.
@@ -306,8 +351,8 @@ def _outside(table: str, runs: str, logs: list[_Log], times: Array) -> Finding:
         "late": late,
         "early": early,
     }
-    code = "times-apart" if level == "problem" else "times-outside"
-    return Finding(level, table, "time_s", code, facts)
+    code = "times-outside-by-quarters" if _quarters(late) or _quarters(early) else "times-outside"
+    return Finding(level, table, "time_s", "times-apart" if level == "problem" else code, facts)
 
 
 def _span(values: list[float]) -> str:
@@ -318,6 +363,12 @@ def _span(values: list[float]) -> str:
 def _listed(names: list[str], more: str) -> str:
     rest = f" and {len(names) - LISTED}{more}" if len(names) > LISTED else ""
     return ", ".join(names[:LISTED]) + rest
+
+
+def _quarters(seconds: float) -> bool:
+    """Whether it is near a whole number of quarters of an hour, and not near none."""
+    whole = QUARTER_S * round(seconds / QUARTER_S)
+    return whole != 0 and abs(seconds - whole) <= NEAR_QUARTER_S
 
 
 def gaps(flight: Flight) -> Iterator[Finding]:

@@ -1,9 +1,12 @@
 """Which pixels of a frame show the scene, and which frames do.
 
 Not the scene are letterboxes and curved borders, burnt-in text, pixels that are dead or stuck, and the
-frames of a closed shutter, by which a thermal camera corrects itself (FFC): these have noise and nothing
-else, means over blocks differ no more than those of independent pixels, and nothing small stands out. A
-shutter whose picture is shaded is not told.
+frames that a thermal camera gives while it corrects itself (FFC): some cameras show the closed shutter,
+others go on with the last picture. A closed shutter has noise and nothing else: means over blocks differ no
+more than those of independent pixels, and nothing small stands out. A held picture repeats to the last bit,
+which a camera with noise does not do by itself. In compressed video of a camera that stands still whole
+pictures repeat though nothing is held; there it cannot be told, and is not. Nor is a shutter whose picture
+is shaded.
 """
 
 from __future__ import annotations
@@ -196,6 +199,9 @@ SAMPLED, SAMPLED_RATIO = 4, 3.0
 #: px: side of the squares whose mean may lie off by so many standard deviations of independent pixels, and to
 #: how many a single pixel counts. A dead pixel moves such a mean by one, a warm body of 3 px by nine.
 SMALL, STANDS_OUT, CLIPPED_AT = 5, 7.0, 5.0
+#: Frames alike, one after another, from which on a picture is held: where frames are shown twice to fill up a
+#: frame rate, there are fewer. And the share of neighbouring frames that may be alike for it to be told.
+HELD, MOST_ALIKE = 3, 0.25
 
 
 def is_shutter(image: NDArray[Any], valid: NDArray[np.bool_]) -> bool:
@@ -246,6 +252,25 @@ def _is_even(image: NDArray[Any], valid: NDArray[np.bool_], side: int, most_rati
     if inside <= 0 or means.var() >= most_ratio * inside / side**2:
         return False
     return bool(np.abs(cv2.blur(grey, (SMALL, SMALL))).max() < STANDS_OUT * np.sqrt(inside) / SMALL)
+
+
+def are_alike(one: NDArray[Any], other: NDArray[Any]) -> bool:
+    """Whether two images are the same to the last bit.
+
+    Parameters
+    ----------
+    one, other
+        Of any kind.
+
+    Returns
+    -------
+    bool
+    """
+    if one.shape != other.shape or one.dtype != other.dtype:
+        return False
+    few = (slice(None, None, 16), slice(None, None, 16))
+    missing = one.dtype.kind == "f"
+    return all(np.array_equal(a, b, equal_nan=missing) for a, b in ((one[few], other[few]), (one, other)))
 
 
 # -- pixels over a sequence

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import compress, islice
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +34,10 @@ from wildlab.flight.readers.frames.image import (
     spoilt,
 )
 from wildlab.flight.readers.frames.scene import (
+    HELD,
+    MOST_ALIKE,
     Vignetting,
+    are_alike,
     find_dead,
     find_overlay,
     is_shutter,
@@ -42,7 +46,9 @@ from wildlab.flight.readers.frames.scene import (
 )
 from wildlab.flight.readers.frames.thermal import MOST_PIXELS, quiet
 
-#: Images of a folder that are looked at, and those that are read to find what stays:
+#: What the problems of such frames have in them.
+CORRECTIONS = ("flat-field correction", "picture is held")
+#: Images of a folder that are looked at, and those that are read, each with the next one, to find what stays:
 #: burnt-in text, dead pixels, dark corners.
 MOST_FILES, SAMPLE = 1_000_000, 12
 
@@ -59,6 +65,8 @@ class Kept:
         (H, W) bool: burnt-in text, and pixels that do not see the scene. None where it cannot be told.
     vignetting
         None where none was asked for, or none is measured.
+    held_can_be_told
+        Whether neighbouring frames differ as a rule.
     notes
         Clauses on how they were read.
     """
@@ -67,6 +75,7 @@ class Kept:
     overlay: NDArray[np.bool_] | None = None
     dead: NDArray[np.bool_] | None = None
     vignetting: Vignetting | None = None
+    held_can_be_told: bool = False
     notes: tuple[str, ...] = ()
 
 
@@ -119,7 +128,9 @@ class Frames:
             With burnt-in overlays taken out of what is valid, and a problem where it is of another size than
             most.
         """
-        yield from self._checked(self._read(lambda number: number >= first))
+        # A picture that is held is told by those before it.
+        early = max(first - HELD + 1, 0)
+        yield from islice(self._checked(self._read(lambda number: number >= early)), first - early, None)
 
     def some(self, numbers: Collection[int]) -> Iterator[Frame]:
         """Some of the frames; the others are not decoded.
@@ -134,7 +145,10 @@ class Frames:
         Frame
             As of `starting_at`, in their order.
         """
-        yield from self._checked(self._read(set(numbers).__contains__))
+        wanted = set(numbers)
+        needed = {number - back for number in wanted for back in range(HELD) if number >= back}
+        order = (number in wanted for number in sorted(needed))
+        yield from compress(self._checked(self._read(needed.__contains__)), order)
 
     def _read(self, wanted: Callable[[int], bool]) -> Iterator[Frame]:
         if self.files:
@@ -145,12 +159,8 @@ class Frames:
             yield from read_video(self.path, wanted, polarity=self.polarity)
 
     def _checked(self, found: Iterator[Frame]) -> Iterator[Frame]:
-        for one in self._of_size(found):
-            if one.usable and is_shutter(one.image, one.valid):
-                said = "the shutter is closed: it shows noise and nothing else (flat-field correction)"
-                yield spoilt(one.name, said, one.time)
-            else:
-                yield self._cleaned(one) if one.usable else one
+        for one in mark_shutter(self._of_size(found), self.kept.held_can_be_told):
+            yield self._cleaned(one) if one.usable else one
 
     def _of_size(self, found: Iterator[Frame]) -> Iterator[Frame]:
         size = self.kept.size
@@ -179,16 +189,19 @@ class Frames:
     @cached_property
     def kept(self) -> Kept:
         """What stays from frame to frame, by a sample: to read all twice would take as long as detecting."""
-        some = [one for one in self._some() if one.usable]
+        pairs = [(one, two) for one, two in self._some() if one.usable]
+        some = [one for one, _ in pairs]
         sizes = Counter(one.image.shape[:2] for one in some).most_common(1)
         # Where no size has a majority there is none that others fall short of.
         size = sizes[0][0] if sizes and 2 * sizes[0][1] > len(some) else ()
+        alike = [are_alike(one.image, two.image) for one, two in pairs if two is not None and two.usable]
+        told = bool(alike) and sum(alike) <= MOST_ALIKE * len(alike)
         like = [one for one in some if one.image.shape[:2] == size and not is_shutter(one.image, one.valid)]
         # Counts and temperatures are taken before anything is written into a picture.
         overlay = find_overlay([_grey(one.image) for one in like if one.unit in ("grey", "colour")])
         notes = tuple(dict.fromkeys(one.note for one in some if one.note))
         if not like:
-            return Kept(size, overlay, notes=notes)
+            return Kept(size, overlay, held_can_be_told=told, notes=notes)
         unit = Counter(one.unit for one in like).most_common(1)[0][0]
         like = [one for one in like if one.unit == unit]
         valid = np.logical_and.reduce([one.valid for one in like])
@@ -197,21 +210,31 @@ class Frames:
         greys = [_grey(one.image) for one in like]
         dead = find_dead(greys, valid)
         vignetting = measure_vignetting(greys, valid) if self.even and unit != "colour" else None
-        return Kept(size, overlay, dead, vignetting, notes)
+        return Kept(size, overlay, dead, vignetting, told, notes)
 
-    def _some(self) -> Iterator[Frame]:
+    def _some(self) -> Iterator[tuple[Frame, Frame | None]]:
+        """Some frames, each with the one after it."""
         count = self.count or 1
         numbers = np.unique(np.linspace(0, max(count - 1, 0), SAMPLE).round().astype(int)).tolist()
         if self.files:
-            yield from (read_image(self.files[number], polarity=self.polarity) for number in numbers)
+            for number in numbers:
+                after = self.files[number + 1 : number + 2]
+                yield (
+                    read_image(self.files[number], polarity=self.polarity),
+                    next((read_image(path, polarity=self.polarity) for path in after), None),
+                )
             return
         capture = open_video(self.path)
         try:
             for number in numbers:
                 capture.set(cv2.CAP_PROP_POS_FRAMES, float(number))
-                done, picture = capture.read()
-                if done:
-                    yield as_frame(frame_name(self.path, int(number)), None, picture, self.polarity)
+                two = [
+                    as_frame(frame_name(self.path, int(number)), None, picture, self.polarity)
+                    for done, picture in (capture.read(), capture.read())
+                    if done
+                ]
+                if two:
+                    yield two[0], next(iter(two[1:]), None)
         finally:
             capture.release()
 
@@ -283,6 +306,42 @@ def filled(image: NDArray[Any], dead: NDArray[np.bool_]) -> NDArray[Any]:
     whole = image.copy()
     whole[dead] = cv2.medianBlur(image, 3)[dead]
     return whole
+
+
+# -- flat-field corrections
+
+
+def mark_shutter(frames: Iterable[Frame], held_can_be_told: bool) -> Iterator[Frame]:
+    """Frames in their order; those of a shutter with a problem in place of their image.
+
+    Parameters
+    ----------
+    frames
+        Of one camera, one after another.
+    held_can_be_told
+        Whether neighbouring frames of this camera differ as a rule.
+
+    Yields
+    ------
+    Frame
+        From the third one alike on, a picture is held; the first two of them stay.
+    """
+    before: NDArray[Any] | None = None
+    run = 1
+    for frame in frames:
+        if not frame.usable:
+            yield frame
+            continue
+        run = run + 1 if before is not None and are_alike(before, frame.image) else 1
+        before = frame.image
+        if is_shutter(frame.image, frame.valid):
+            said = "the shutter is closed: it shows noise and nothing else (flat-field correction)"
+            yield spoilt(frame.name, said, frame.time)
+        elif held_can_be_told and run >= HELD:
+            said = f"its picture is held: it repeats the {HELD - 1} frames before it to the last bit"
+            yield spoilt(frame.name, said, frame.time)
+        else:
+            yield frame
 
 
 # -- videos
