@@ -14,12 +14,13 @@ function last(times, t) {
   return low - 1;
 }
 
-// A place (north, east) on a way at a time, on a straight line between two of its own; null before and after it.
+// A place (north, east) on a way at a time, on a straight line between two of its own; null where nothing is known.
 function place(way, t) {
-  if (way.still) return way.p[0];
+  if (way.still) return way.p[0][0] === null ? null : way.p[0];
   const i = last(way.t, t), next = i + 1;
-  if (i < 0) return null;
-  if (next >= way.t.length) return t > way.t[i] + STAY ? null : way.p[i];
+  if (i < 0 || way.p[i][0] === null) return null;
+  if (next >= way.t.length || way.t[next] - way.t[i] > way.gap || way.p[next][0] === null)
+    return t > way.t[i] + STAY ? null : way.p[i];
   const share = (t - way.t[i]) / (way.t[next] - way.t[i] || 1);
   return [0, 1].map(k => way.p[i][k] + share * (way.p[next][k] - way.p[i][k]));
 }
@@ -46,6 +47,16 @@ function view(w, h) {
   return [scale, p => [w / 2 + (p[1] - centre[1]) * scale, h / 2 - (p[0] - centre[0]) * scale], centre];
 }
 
+// Its places up to a row, with a break where it is not known.
+function pieces(way, end) {
+  const found = [];
+  for (let i = 0; i <= end; i++) {
+    if (i && way.t[i] - way.t[i - 1] > way.gap) found.push([null]);
+    found.push(way.p[i]);
+  }
+  return found;
+}
+
 function line(ctx, to, places, stroke, width, alpha) {
   ctx.beginPath();
   let open = false;
@@ -59,12 +70,13 @@ function line(ctx, to, places, stroke, width, alpha) {
 }
 
 function dot(ctx, to, p, fill, radius) {
+  if (p[0] === null) return;
   const [x, y] = to(p);
   ctx.beginPath(); ctx.arc(x, y, radius, 0, 2 * Math.PI); ctx.fillStyle = fill; ctx.fill();
 }
 
 function ellipse(ctx, to, scale, p, axes, stroke) {
-  if (axes[0] === null) return;
+  if (axes[0] === null || p[0] === null) return;
   const [x, y] = to(p);
   ctx.beginPath(); ctx.ellipse(x, y, axes[0] * scale, axes[1] * scale, axes[2], 0, 2 * Math.PI);
   ctx.strokeStyle = stroke; ctx.lineWidth = 1.3; ctx.stroke();
@@ -76,8 +88,8 @@ function drawMap() {
     const [south, west, north, east] = scene.ground.extent, [x, y] = to([north, west]), [right, low] = to([south, east]);
     ctx.globalAlpha = .7; ctx.drawImage(loaded.ground, x, y, right - x, low - y); ctx.globalAlpha = 1;
   }
-  if (scene.path) line(ctx, to, scene.path.p, colour("flown"), 1.2, .5);
-  for (const one of scene.truth) if (!one.still) line(ctx, to, one.p, ink, 1, .45);
+  if (scene.path) line(ctx, to, pieces(scene.path, scene.path.t.length - 1), colour("flown"), 1.2, .5);
+  for (const one of scene.truth) if (!one.still) line(ctx, to, pieces(one, one.t.length - 1), ink, 1, .45);
   if (frames) {
     const i = last(frames.t, now), ring = i < 0 || now > frames.t[i] + STAY ? [[null]] : frames.outlines[i];
     if (ring[0][0] !== null) line(ctx, to, [...ring, ring[0]], colour("seen"), 2, 1);
@@ -96,11 +108,13 @@ function drawMap() {
   for (const one of scene.tracks) {
     const i = last(one.t, now);
     if (i < 0) continue;
-    line(ctx, to, one.p.slice(0, i + 1), one.colour, 1.2, .6);
+    line(ctx, to, pieces(one, i), one.colour, 1.2, .6);
     if (now > one.t[i] + STAY) continue;
     dot(ctx, to, one.p[i], one.colour, 4);
     ellipse(ctx, to, scale, one.p[i], one.ellipses[i], one.colour);
   }
+  const craft = scene.path && place(scene.path, now);
+  if (craft) dot(ctx, to, craft, colour("flown"), 6);
   ctx.textAlign = "left";
   for (const one of scene.truth) {
     const p = place(one, now);
@@ -108,8 +122,6 @@ function drawMap() {
     dot(ctx, to, p, ink, 3.5);
     if (scene.truth.length <= 12) { const [x, y] = to(p); ctx.fillText(one.name, x + 7, y - 6); }
   }
-  const p = scene.path && place(scene.path, now);
-  if (p) dot(ctx, to, p, colour("flown"), 6);
   // Metres, by a bar of a round length, and where north is.
   const metres = [1, 2, 5].flatMap(k => [...Array(7).keys()].map(n => k * 10 ** (n - 1)))
     .sort((a, b) => a - b).filter(m => m * scale <= w / 4).pop() || .1;
@@ -124,7 +136,7 @@ function drawMap() {
 function shownFrame() {
   if (!pictures.length) return last(frames.t, now);
   const i = last(pictures.map(one => frames.t[one[0]]), now);
-  return i < 0 ? pictures[0][0] : pictures[i][0];
+  return i < 0 ? last(frames.t, now) : pictures[i][0];
 }
 
 function drawImage() {
@@ -147,34 +159,44 @@ function drawImage() {
 const told = t => !scene.timed ? "image " + Math.round(t)
   : Math.floor(t / 60) + ":" + String(Math.floor(t % 60)).padStart(2, "0") + " min";
 
+// Of each strip its name, the series in it, whether its scale is logarithmic, and a band.
 function rows() {
   const judged = scene.tracks.length ? scene.tracks : scene.points ? [{...scene.points, colour: colour("points"), dots: true}] : [];
-  const found = [["Error (m)", judged.map(one => [one, one.error]), null],
-                 ["NEES, 95 % below the line", judged.map(one => [one, one.nees]), scene.band]];
-  if (scene.path) found.push(["Height above ground (m)", [[{...scene.path, colour: colour("flown")}, scene.path.height]], null]);
+  const found = [["Error (m)", judged.map(one => [one, one.error]), true, null],
+                 ["NEES, dashed: 95 %", judged.map(one => [one, one.nees]), true, scene.band]];
+  if (scene.path) found.push(["Height above ground (m)", [[{...scene.path, colour: colour("flown")}, scene.path.height]], false, null]);
   return found.filter(row => row[1].some(([, values]) => values.some(v => v !== null)));
 }
 
 function drawStrips() {
-  const [ctx, w, h] = begin(strips), all = rows(), each = h / Math.max(all.length, 1), x = t => 8 + t / (scene.length || 1) * (w - 16);
+  const [ctx, w, h] = begin(strips), all = rows(), each = (h - 18) / Math.max(all.length, 1), left = 44;
+  const x = t => left + t / (scene.length || 1) * (w - left - 8);
   strips.hidden = !all.length;
-  all.forEach(([label, series, level], k) => {
-    const known = series.flatMap(([, values]) => values.filter(v => v !== null)).sort((a, b) => a - b);
-    // A few large values would press all others flat: they are cut.
-    const top = Math.max(1.15 * known[Math.floor(.98 * (known.length - 1))], level ? 1.3 * level : 0, 1e-3);
-    const low = (k + 1) * each - 6, y = v => low - Math.min(v / top, 1.02) * (each - 26);
-    ctx.strokeStyle = colour("line"); ctx.lineWidth = 1;
-    ctx.beginPath(); ctx.moveTo(8, low); ctx.lineTo(w - 8, low); ctx.stroke();
-    if (level) { ctx.setLineDash([5, 4]); ctx.strokeStyle = colour("dim"); ctx.beginPath(); ctx.moveTo(8, y(level)); ctx.lineTo(w - 8, y(level)); ctx.stroke(); ctx.setLineDash([]); }
+  all.forEach(([label, series, log, band], k) => {
+    const known = series.flatMap(([, values]) => values.filter(v => v !== null)).concat(band || []);
+    const most = known.reduce((a, b) => Math.max(a, b), log ? .1 : 0), least = known.reduce((a, b) => Math.min(a, b), most);
+    const ends = log ? [Math.floor(Math.log10(Math.max(least, most / 1e4, 1e-3))), Math.ceil(Math.log10(most))] : [Math.min(least, 0), most * 1.05 || 1];
+    const low = (k + 1) * each - 4, room = each - 26;
+    const y = v => low - (Math.max(log ? Math.log10(Math.max(v, 1e-9)) : v, ends[0]) - ends[0]) / (ends[1] - ends[0] || 1) * room;
+    const marks = log ? [...Array(ends[1] - ends[0] + 1).keys()].map(n => 10 ** (ends[0] + n)) : [ends[0], most];
+    ctx.textAlign = "right"; ctx.lineWidth = 1;
+    marks.forEach((v, n) => {
+      ctx.strokeStyle = colour("line"); ctx.beginPath(); ctx.moveTo(left, y(v)); ctx.lineTo(w - 8, y(v)); ctx.stroke();
+      ctx.fillStyle = colour("dim"); if (n === 0 || n === marks.length - 1) ctx.fillText(+v.toPrecision(3), left - 5, y(v) + 4);
+    });
+    ctx.setLineDash([5, 4]); ctx.strokeStyle = colour("dim");
+    for (const v of band || []) { ctx.beginPath(); ctx.moveTo(left, y(v)); ctx.lineTo(w - 8, y(v)); ctx.stroke(); }
+    ctx.setLineDash([]);
     for (const [one, values] of series) {
       if (one.dots) { ctx.fillStyle = one.colour; values.forEach((v, i) => { if (v !== null) ctx.fillRect(x(one.t[i]) - 1, y(v) - 1, 2.5, 2.5); }); }
       else line(ctx, p => p, one.t.map((t, i) => values[i] === null ? [null] : [x(t), y(values[i])]), one.colour, 1.2, 1);
     }
-    ctx.fillStyle = colour("ink"); ctx.textAlign = "left"; ctx.fillText(label, 8, k * each + 15);
-    ctx.textAlign = "right"; ctx.fillText("to " + (top < 10 ? top.toFixed(1) : Math.round(top)), w - 8, k * each + 15);
+    ctx.fillStyle = colour("ink"); ctx.textAlign = "left"; ctx.fillText(label, left, k * each + 15);
   });
+  ctx.fillStyle = colour("dim"); ctx.textAlign = "left"; ctx.fillText(told(0), left, h - 3);
+  ctx.textAlign = "right"; ctx.fillText(told(scene.length), w - 8, h - 3);
   ctx.strokeStyle = colour("ink"); ctx.lineWidth = 1.5;
-  ctx.beginPath(); ctx.moveTo(x(now), 0); ctx.lineTo(x(now), h); ctx.stroke();
+  ctx.beginPath(); ctx.moveTo(x(now), 0); ctx.lineTo(x(now), h - 18); ctx.stroke();
 }
 
 function draw() {
@@ -206,7 +228,8 @@ function toggle() {
 function nearer(factor) {
   const focus = nowSeen();
   if (zoom * factor > 1 && !middle && focus) middle = focus;
-  zoom = Math.max(zoom * factor, .5);
+  // No closer than a hundred pixels to the metre.
+  zoom = Math.max(Math.min(zoom * factor, 100 / view(map.clientWidth, map.clientHeight)[0] * zoom), .5);
   draw();
 }
 // What one comes closer to: the latest estimate, target or detection, else the aircraft.
@@ -231,7 +254,7 @@ map.addEventListener("pointermove", event => {
   middle = [centre[0] + event.movementY / scale, centre[1] - event.movementX / scale];
   draw();
 });
-const seek = event => { if (event.type === "pointerdown" || event.buttons & 1) go((event.offsetX - 8) / (strips.clientWidth - 16) * scene.length); };
+const seek = event => { if (event.type === "pointerdown" || event.buttons & 1) go((event.offsetX - 44) / (strips.clientWidth - 52) * scene.length); };
 strips.addEventListener("pointerdown", seek);
 strips.addEventListener("pointermove", seek);
 function load(name, address) { const one = new Image(); one.onload = () => { loaded[name] = one; draw(); }; one.src = address; }

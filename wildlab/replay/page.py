@@ -18,15 +18,16 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import ArrayLike
 
+from wildlab.evaluation.consistency import chi_square_interval
+from wildlab.flight.clocks import longest_gap
+from wildlab.geometry.frames import Indices
 from wildlab.replay.images import Shot
 from wildlab.replay.scene import (
-    MOST_POINTS,
     SHARE,
     Array,
     Estimates,
     Points,
     ReplayScene,
-    Target,
     heights,
     minutes,
     plain,
@@ -36,8 +37,9 @@ from wildlab.replay.scene import (
 from wildlab.reporting.figures import colour, filter_words
 from wildlab.reporting.text import TEMPLATES, render
 
-#: Pictures and their bytes in a page, at most: a phone opens it at once.
-MOST_PICTURES, PICTURE_BYTES = 120, 1_400_000
+#: Pictures and their bytes in a page, rows of points and of a way, and detections in images, at most: below
+#: 3 MB a phone opens it at once.
+MOST_PICTURES, PICTURE_BYTES, MOST_ROWS, MOST_SEEN = 120, 800_000, 3000, 10_000
 #: What the browser may do: run the script with this hash, and show what is in the file.
 POLICY = (
     "default-src 'none'; script-src 'sha256-{script}'; style-src 'sha256-{style}'; img-src data:; "
@@ -73,13 +75,19 @@ def page(scene: ReplayScene, shots: Mapping[int, Shot]) -> str:
             filters=_filters(scene),
             points=scene.points is not None,
             truth=bool(scene.truth),
-            lacks=scene.lacks,
+            path=scene.path is not None,
+            lacks=(*scene.lacks, *_thinned(scene)),
             style=Markup(style),  # noqa: S704 - ours
             script=Markup(script),  # noqa: S704 - ours
             data=Markup(data),  # noqa: S704 - without a mark
         )
         + "\n"
     )
+
+
+def _thinned(scene: ReplayScene) -> list[str]:
+    count = 0 if scene.sightings is None else len(scene.sightings.frame)
+    return [f"every detection in the images: {MOST_SEEN} of {count} are, evenly"] if count > MOST_SEEN else []
 
 
 def _hash(text: str) -> str:
@@ -109,58 +117,53 @@ def drawn(scene: ReplayScene, shots: Mapping[int, Shot]) -> dict[str, Any]:
         "timed": scene.timed,
         "length": scene.length,
         "extent": _rounded([low[0], low[1], high[0], high[1]]),
-        # 95 % of a chi-square with two degrees of freedom lie below.
-        "band": -2.0 * float(np.log(1.0 - 0.95)),
+        "band": chi_square_interval(2),
         "tracks": [],
-        "truth": [_way(one, 2 * MOST_POINTS // len(scene.truth)) for one in scene.truth],
+        "truth": [
+            {"name": plain(one.name), "still": one.still}
+            | _way(one.times, one.places, spread_evenly(len(one.times), 2 * MOST_ROWS // len(scene.truth)))
+            for one in scene.truth
+        ],
     }
     if scene.path is not None:
-        found["path"] = {
-            "t": _rounded(scene.path.times, 3),
-            "p": _rounded(scene.path.places[:, :2]),
-            "height": _rounded(heights(scene), 1),
-        }
+        kept = spread_evenly(len(scene.path.times), MOST_ROWS)
+        found["path"] = _way(scene.path.times, scene.path.places, kept)
+        found["path"]["height"] = _rounded(heights(scene)[kept], 1)
     if scene.views is not None:
         # Every other place of a border: its corners, and the middles of its sides.
         found["frames"] = {
             "t": _rounded(scene.views.times, 3),
             "outlines": _rounded(scene.views.outlines[:, ::2, :2], 1),
         }
-        found["pictures"] = _pictures(shots)
+        found["pictures"] = _pictures(scene, shots)
     if scene.camera is not None:
         found["size"] = [scene.camera.width, scene.camera.height]
     if scene.sightings is not None:
+        kept = spread_evenly(len(scene.sightings.frame), MOST_SEEN)
         found["seen"] = {
-            "frame": scene.sightings.frame.tolist(),
-            "uv": _rounded(scene.sightings.uv),
-            "names": [plain(name) for name in scene.sightings.names],
+            "frame": scene.sightings.frame[kept].tolist(),
+            "uv": _rounded(scene.sightings.uv[kept]),
+            "names": [plain(name) for name in scene.sightings.names[kept]],
         }
     if scene.points is not None:
-        found["points"] = _judged(scene.points, MOST_POINTS)
+        found["points"] = _judged(scene.points, MOST_ROWS)
     for one in scene.tracks:
-        rows = _judged(one, 2 * MOST_POINTS // len(scene.tracks))
+        rows = _judged(one, 2 * MOST_ROWS // len(scene.tracks))
         found["tracks"].append({"colour": colour(one.filter), **rows})
     if scene.terrain is not None:
         found["ground"] = _ground(scene)
     return found
 
 
-def _way(of: Target, most: int) -> dict[str, Any]:
-    rows = spread_evenly(len(of.times), max(most, 2))
-    times = np.nan_to_num(of.times[rows])
-    return {
-        "name": plain(of.name),
-        "still": of.still,
-        "t": _rounded(times, 3),
-        "p": _rounded(of.places[rows, :2]),
-    }
+def _way(times: Array, places: Array, rows: Indices) -> dict[str, Any]:
+    """Places by time; between two that lie farther apart than ``gap``, s, nothing is known."""
+    t = np.nan_to_num(times[rows])
+    return {"t": _rounded(t, 3), "p": _rounded(places[rows, :2]), "gap": longest_gap(t)}
 
 
 def _judged(of: Points | Estimates, most: int) -> dict[str, Any]:
-    rows = spread_evenly(len(of.times), max(most, 2))
-    return {
-        "t": _rounded(of.times[rows], 3),
-        "p": _rounded(of.places[rows, :2]),
+    rows = spread_evenly(len(of.times), most)
+    return _way(of.times, of.places, rows) | {
         "ellipses": _rounded(ellipse_axes(of.covariance[rows])),
         "error": _rounded(of.error[rows]),
         "nees": _rounded(of.nees[rows]),
@@ -189,12 +192,15 @@ def ellipse_axes(covariance: Array) -> Array:
     return found
 
 
-def _pictures(shots: Mapping[int, Shot]) -> list[list[Any]]:
-    """Row of the frame and address of its picture, of some of them evenly."""
-    rows = sorted(shots)
-    rows = [rows[i] for i in spread_evenly(len(rows), MOST_PICTURES)]
+def _pictures(scene: ReplayScene, shots: Mapping[int, Shot]) -> list[list[Any]]:
+    """Row of the frame and address of its picture: of too many half evenly, half where something was seen."""
+    rows = np.array(sorted(shots), int)
+    if len(rows) > MOST_PICTURES:
+        seen = rows[np.isin(rows, [] if scene.sightings is None else scene.sightings.frame)]
+        half = MOST_PICTURES // 2
+        rows = np.union1d(rows[spread_evenly(len(rows), half)], seen[spread_evenly(len(seen), half)])
     most = PICTURE_BYTES // max(len(rows), 1)
-    return [[row, _address("jpeg", smaller(shots[row].jpeg, most))] for row in rows]
+    return [[int(row), _address("jpeg", smaller(shots[row].jpeg, most))] for row in rows]
 
 
 def smaller(jpeg: bytes, most: int) -> bytes:

@@ -187,7 +187,8 @@ class ReplayScene:
     @property
     def length(self) -> float:
         """The last time at which anything happens, s; zero where nothing does."""
-        times = [one.times for one in (self.path, self.views, self.points, *self.tracks) if one is not None]
+        parts = (self.path, self.views, self.points, *self.tracks, *self.truth)
+        times = [one.times for one in parts if one is not None]
         known = [float(np.nanmax(t)) for t in times if np.isfinite(t).any()]
         return max([0.0, *known])
 

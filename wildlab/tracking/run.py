@@ -346,7 +346,7 @@ def run_filter(
     start
         See `Start`, `start_from_first`.
     pose
-        Errors to consider: the Schmidt filter, H (7.32)-(7.38). Those of the poses (`PoseUncertainty`), or
+        Errors to consider: the Schmidt filter, H (7.32)-(7.38). Those of the poses (`Considered`), or
         any (`consider`). None: poses are taken as true.
     gate_probability
         Probability that the target's own measurement is let in, H (3.9); what falls outside the validation
