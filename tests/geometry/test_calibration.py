@@ -8,9 +8,11 @@ import pytest
 from wildlab.geometry.calibration import (
     BORESIGHT,
     Calibration,
+    Fit,
     apply_calibration,
     calibrate,
     georeference_calibrated,
+    with_covariance,
 )
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix, rotation_vector_to_matrix
@@ -184,3 +186,21 @@ def test_one_wrong_click_does_not_decide():
     survey.known[7, :2] += 60.0
     found = calibrate(survey.poses_at(), survey.uv, survey.known, survey.image)
     assert np.allclose(apply_calibration(found, PLAIN).misalignment, TRUE.misalignment, atol=np.radians(0.1))
+
+
+def test_draws_that_wander_together_make_an_estimate_less_sure():
+    """The mean of errors that last for some draws: it is as far off as its standard deviation says."""
+    rng, error, sd = np.random.default_rng(5), [], []
+    draw = np.repeat(np.arange(20), 6)
+    for _ in range(150):
+        wander = np.zeros(20)
+        for k in range(20):
+            wander[k] = 0.6 * (wander[k - 1] if k else rng.normal() / 0.8) + rng.normal()
+        r = np.stack([wander[draw] + 0.3 * rng.normal(size=len(draw)), rng.normal(size=len(draw))], axis=1)
+        J = np.zeros((len(draw), 2, 1))
+        J[:, 0, 0] = -1.0
+        fit = Fit(("roll",), np.array([r[:, 0].mean()]), {}, np.ones(len(draw), bool), J, r - r[:, :1].mean())
+        error.append(fit.values[0])
+        sd.append(with_covariance(fit, draw, draw).sd("roll"))
+    # 2.0 without what neighbours have in common.
+    assert 0.75 < np.sqrt(np.mean(np.square(error)) / np.mean(np.square(sd))) < 1.3

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.geometry.covariances import normal_quantile, student_quantile
+from wildlab.geometry.covariances import independent_count, normal_quantile, student_quantile
 
 
 class Interval(NamedTuple):
@@ -222,8 +222,6 @@ Labels = NDArray[np.intp]
 
 #: Fewest and most blocks, images in a block where there are enough, and how long one is at least, s.
 FEWEST, MOST, IMAGES, LONG_S = 6, 20, 3, 60.0
-#: Independent blocks that a mean is worth at least: with fewer, intervals are wider and hold no more.
-FEWEST_WORTH = 3.0
 #: With what probability an interval holds, unless another is asked for.
 PROBABILITY = 0.9
 
@@ -321,11 +319,7 @@ def independent_blocks(values: ArrayLike, blocks: ArrayLike) -> float:
     >>> round(independent_blocks(wave, np.arange(20)), 1)
     3.0
     """
-    apart, count = _apart(values, blocks)
-    square = float(apart @ apart)
-    alike = float(apart[1:] @ apart[:-1]) / square if square > 0 else 0.0
-    alike = float(np.clip(alike + (1 + 3 * alike) / count, 0.0, 0.9))
-    return max(count * (1 - alike) / (1 + alike), min(FEWEST_WORTH, count))
+    return independent_count(_apart(values, blocks)[0])
 
 
 def widening(values: ArrayLike, blocks: ArrayLike, probability: float = PROBABILITY) -> float:

@@ -28,6 +28,7 @@ from wildlab.geometry.corrections import (
     calibrated_poses,
     georeference_calibrated,
 )
+from wildlab.geometry.covariances import independent_count
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.geometry.mount import Mount
@@ -408,6 +409,7 @@ def _jackknife(J: Array, r: Array, groups: np.ndarray) -> Array:
     """Covariance (P, P) of a linear fit: how far it moves when one draw is left out, each in turn.
 
     It knows that residuals of one draw go together, and errs, where there are few draws, on the safe side.
+    Draws in time order that are like their neighbours count for fewer.
     """
     labels = np.unique(groups)
     n = len(labels)
@@ -415,6 +417,7 @@ def _jackknife(J: Array, r: Array, groups: np.ndarray) -> Array:
         return np.full((J.shape[-1],) * 2, np.nan)
     without = np.stack([fit_linear(J[groups != g], r[groups != g]).x for g in labels])
     apart = without - without.mean(axis=0)
+    apart *= np.sqrt([n / independent_count(one) for one in apart.T])
     return np.asarray((n - 1) / n * apart.T @ apart)
 
 
