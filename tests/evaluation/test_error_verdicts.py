@@ -1,4 +1,4 @@
-"""Axes, ellipses, sightings and ambiguous clicks: verdicts follow from numbers that are known."""
+"""Axes, ellipses and sightings: verdicts follow from numbers that are known."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import pytest
 from wildlab.evaluation.ellipses import judge_ellipses, spread_of_sightings
 from wildlab.evaluation.errors import split_along
 from wildlab.evaluation.intervals import time_blocks
-from wildlab.evaluation.outliers import ambiguous, largest_visible
+from wildlab.evaluation.outliers import largest_visible
 
 BLOCKS = np.arange(240) // 12
 
@@ -110,13 +110,6 @@ def test_the_spread_of_sightings_is_that_of_one_and_blind_to_what_all_share():
     assert (found.things, found.sightings) == (60, 240)
     assert spread_of_sightings(normal(4), np.arange(240), images) is None
     assert np.isnan(spread_of_sightings(normal(4), things, images).consistent)
-
-
-def test_a_click_is_ambiguous_where_two_marks_are_alike():
-    assert ambiguous([2.0, 2.0, 9.0], [20.0, 3.0, 9.5], 2.0).tolist() == [False, True, True]
-    assert not ambiguous([5.0], [np.inf], 2.0).any()
-    # The better the flight, the fewer.
-    assert ambiguous([1.0], [4.0], 2.0).all() and not ambiguous([1.0], [4.0], 0.5).any()
 
 
 def test_beyond_half_the_spacing_an_error_cannot_show():

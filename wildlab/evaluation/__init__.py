@@ -15,7 +15,7 @@ Floating Objects using UAVs with Optical Sensors, doctoral thesis, NTNU 2019.
   err; `time_blocks`, `block_mean`, `compare_halves`: in blocks in time order.
 - `held_out`, `gain_of`, `rank_models`: which constant error is behind them, `estimate_wander`: against noise
   that is correlated in time; `split_along`; `find_outliers`.
-- `judge_ellipses`, `spread_of_sightings`, `ambiguous`: what they are worth.
+- `judge_ellipses`, `spread_of_sightings`: what they are worth.
 """
 
 from typing import TYPE_CHECKING
@@ -71,7 +71,7 @@ if TYPE_CHECKING:
         share_interval,
         time_blocks,
     )
-    from wildlab.evaluation.outliers import Outlier, ambiguous, find_outliers, largest_visible
+    from wildlab.evaluation.outliers import Outlier, find_outliers, largest_visible
     from wildlab.evaluation.pose_noise import PoseNoise, estimate_pose_noise, estimate_position_noise
 else:
     __getattr__, __dir__ = offer(__name__)
@@ -98,7 +98,6 @@ __all__ = [
     "TrackSummary",
     "WanderNoise",
     "Whiteness",
-    "ambiguous",
     "autocorrelation",
     "average",
     "block_mean",

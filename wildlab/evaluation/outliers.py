@@ -167,30 +167,6 @@ def _far_photos(z: Array, photos: Names, rows: Mask, scale: float) -> list[str]:
 ODDS = 19.0
 
 
-def ambiguous(nearest: ArrayLike, second: ArrayLike, sd: float) -> NDArray[np.bool_]:
-    """Whether a click may as well be of the second nearest mark.
-
-    Parameters
-    ----------
-    nearest, second
-        (N,) m, distances to the two marks that lie nearest; infinite where there is no second.
-    sd
-        Standard deviation of an error along either axis, m.
-
-    Returns
-    -------
-    (N,) bool; False where the nearest is NaN
-
-    Examples
-    --------
-    >>> ambiguous([1.0, 1.0], [1.5, 20.0], 2.0).tolist()
-    [True, False]
-    """
-    d1, d2 = np.asarray(nearest, float), np.asarray(second, float)
-    with np.errstate(invalid="ignore"):
-        return np.asarray(d2**2 - d1**2 < 2 * sd**2 * np.log(ODDS))
-
-
 def largest_visible(marks: ArrayLike) -> float:
     """The error beyond which the nearest mark is usually another one: half the median spacing of the marks.
 

@@ -266,7 +266,7 @@ def _generalised(
         )
     if words is not None and otherwise:
         raise RunFailed(
-            f"the sheet would not say what your reports say: {' '.join(otherwise)}",
+            f"the sheet would not say what your reports say: {' '.join(otherwise).rstrip('.')}",
             "share the reports without --edition: they say at their top where they differ",
             file=source.folders[0],
         )
