@@ -84,6 +84,7 @@ def test_a_wrong_attitude_is_named_also_where_half_of_them_are_known(flown, chan
     assert told(with_others(turned(flown, change))) == []
 
 
+@pytest.mark.slow
 def test_a_clock_that_is_off_is_named_with_what_to_write(flown):
     frames = flown.table("frames")
     late = replace(flown, tables={**flown.tables, "frames": frames.assign(time_s=frames["time_s"] + 8.0)})
