@@ -21,11 +21,14 @@ from wildlab.analysis.georeference import (
     observe,
 )
 from wildlab.analysis.image_coverage import cover_images
-from wildlab.analysis.tracks.sighting import CvTuning, follow_schmidt, sighting
+from wildlab.analysis.tracks.sighting import CvTuning, sighting, start
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic
 from wildlab.reporting.front_page import FILE
 from wildlab.simulation.twins import simulate_twin
+from wildlab.tracking.run import run_filter
+from wildlab.tracking.schmidt import Considered
+from wildlab.tracking.sensors import POSE, pixels
 
 Array = NDArray[np.float64]
 
@@ -48,8 +51,8 @@ def simulated() -> dict[str, Any]:
     when, flown = nav["time_s"].to_numpy(float), nav[["north_m", "east_m"]].to_numpy(float)
     # It ends where it began, so that the picture's next round goes on from there.
     later = np.flatnonzero((when >= BEGIN + AT_LEAST) & (when <= BEGIN + AT_MOST))
-    start = flown[np.searchsorted(when, BEGIN)]
-    end = float(when[later[np.argmin(np.hypot(*(flown[later] - start).T))]])
+    here = flown[np.searchsorted(when, BEGIN)]
+    end = float(when[later[np.argmin(np.hypot(*(flown[later] - here).T))]])
 
     def part(times: Array, *arrays: Array, every_s: float) -> list[Array]:
         """Rows within the part and beside it on either side, no nearer in time than told."""
@@ -67,8 +70,9 @@ def simulated() -> dict[str, Any]:
     cover = cover_images(flight, SOURCE)
     if cover is None:
         raise WildlabError("the twin has no footprints", "choose another")
-    pose = assumed_pose_covariance(seen.poses.R_nb, assumed)
-    track = follow_schmidt(seen, tuning, pose, PERSIST)
+    pose = Considered(POSE, assumed_pose_covariance(seen.poses.R_nb, assumed), PERSIST)
+    sensor, R = pixels(seen.poses, seen.plane_down), np.eye(2) * tuning.pixel**2
+    track = run_filter(seen.times, seen.uv, R, sensor, tuning.motion, start(seen, tuning), pose=pose)
     points = points.sort_values("time_s")
     frames = np.sort(flight.table("frames")["time_s"].to_numpy(float))
     truth = flight.table("truth")

@@ -106,10 +106,3 @@ def _cell(cell: Any) -> Any:
 
 def _is_number(column: pd.Series) -> bool:
     return column.dtype.kind in "biufcmM"
-
-
-def write_notebook(path: Path, notebook: Any) -> None:
-    """A notebook, atomically: whoever is ended as it writes leaves the former state, not half of one."""
-    import nbformat  # slow to load, and only what runs notebooks has it loaded
-
-    write_atomic(path, nbformat.writes(notebook) + "\n")

@@ -22,6 +22,7 @@ from bs4 import BeautifulSoup, Tag
 from nbformat import NotebookNode
 
 from wildlab.errors import WildlabError
+from wildlab.files import write_atomic
 from wildlab.paths import PACKAGE, ROOT
 from wildlab.reporting.layout import VERDICT, arrange_parts, explain_words
 from wildlab.reporting.page import page
@@ -43,6 +44,11 @@ def read_notebook(path: Path) -> nbformat.NotebookNode:
         raise WildlabError(
             f"this is not a notebook ({type(error).__name__})", "restore the file", file=path.name
         ) from error
+
+
+def write_notebook(path: Path, notebook: NotebookNode) -> None:
+    """Write a notebook atomically: whoever is ended as it writes leaves the former state, not half of one."""
+    write_atomic(path, nbformat.writes(notebook) + "\n")
 
 
 _HEADING = re.compile(r"^#{1,6}\s+(.+?)\s*#*$", re.M)

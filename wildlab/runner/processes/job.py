@@ -19,9 +19,15 @@ from pathlib import Path
 from typing import Any
 
 from wildlab.errors import WildlabError
-from wildlab.files import write_atomic, write_notebook
+from wildlab.files import write_atomic
 from wildlab.paths import REPORTS
-from wildlab.reporting.notebook_pages import clean_notebook, clean_text, read_notebook, step_of
+from wildlab.reporting.notebook_pages import (
+    clean_notebook,
+    clean_text,
+    read_notebook,
+    step_of,
+    write_notebook,
+)
 from wildlab.reporting.page import failure_page
 from wildlab.runner.record.digests import seal
 from wildlab.runner.seeds import SeedWork

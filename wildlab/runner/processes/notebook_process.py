@@ -88,7 +88,7 @@ def _keep_to_ourselves(job: Job) -> None:
 
 
 def _work(pipe: connection.Connection, job: Job) -> None:
-    from wildlab.files import write_atomic, write_json, write_notebook
+    from wildlab.files import write_atomic, write_json
     from wildlab.reporting import metrics, notebook_pages
     from wildlab.reporting.page import first_look_notice
     from wildlab.reporting.status import describe_first_look
@@ -126,7 +126,7 @@ def _work(pipe: connection.Connection, job: Job) -> None:
             cleaned = notebook_pages.clean_notebook(
                 notebook_pages.read_notebook(executed), shown, job.hidden()
             )
-            write_notebook(executed, cleaned)
+            notebook_pages.write_notebook(executed, cleaned)
     pipe.send(("stage", "page"))
     if not (folder / "metrics.json").is_file():
         raise WildlabError(

@@ -22,7 +22,7 @@ from papermill.engines import Engine, NotebookExecutionManager, papermill_engine
 from papermill.exceptions import PapermillExecutionError
 from traitlets.config import Config
 
-from wildlab.files import write_notebook
+from wildlab.reporting.notebook_pages import write_notebook
 
 #: Its name among papermill's engines.
 IN_PROCESS = "wildlab-in-process"
