@@ -157,6 +157,8 @@ def test_truth_of_fixed_and_moving_targets(make_flight):
     assert names == ["buoy", "boat"]
     np.testing.assert_allclose(p[0], [[50.0, 5.0, 0.0]] * 3)
     np.testing.assert_allclose(p[1], [[np.nan] * 3, [40.0, 4.0, 0.0], [100.0, 10.0, 0.0]])
+    names, p = truth_at(truth.sort_values("target_id", kind="stable"), [5.0], offset_s=1.0)
+    assert names == ["boat", "buoy"] and p[1, 0].tolist() == [50.0, 5.0, 0.0]
     names, p = truth_at(truth.iloc[:0], [0.0])
     assert names == []
     assert p.shape == (0, 1, 3)

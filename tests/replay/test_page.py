@@ -7,6 +7,7 @@ import hashlib
 import json
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -95,6 +96,15 @@ def test_half_axes_and_turn_are_the_ellipse_that_rings_draw():
         dots = np.column_stack([-y[k], x[k]])
         away = np.linalg.norm(rings[k, :, None, :2] - dots, axis=2).min(axis=1)
         assert away.max() < 0.02 * a[k, 0]
+
+
+def test_a_flight_that_has_truth_alone_lasts_as_long():
+    scene = scene_of_a_minute("boat")
+    alone = replace(scene, path=None, views=None, sightings=None, points=None, tracks=())
+    assert alone.length == 60.0
+    # Minutes between two fixes are not a straight way.
+    t, p = np.array([0.0, 1.0, 2.0, 600.0, 601.0]), np.zeros((5, 3))
+    assert 1 < drawn(replace(scene, truth=(Target("boat", t, p),)), {})["truth"][0]["gap"] < 598
 
 
 def test_pictures_are_few_and_small():
