@@ -110,25 +110,15 @@ def find_chromium() -> str | None:
 
 
 @pytest.fixture(scope="session")
-def launch() -> Iterator[Callable[..., Any]]:
-    """``launch(*arguments)`` starts a browser. One player for all of them: a process can hold no second."""
+def chromium() -> Iterator[Any]:
     program = find_chromium()
     if program is None:
         pytest.skip("needs Chromium: install it, or name one in WILDLAB_CHROMIUM")
     playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (the extra `dev`)")
     with playwright.sync_playwright() as play:
-
-        def start(*arguments: str) -> Any:
-            return play.chromium.launch(executable_path=program, args=["--no-sandbox", *arguments])
-
-        yield start
-
-
-@pytest.fixture(scope="session")
-def chromium(launch: Callable[..., Any]) -> Iterator[Any]:
-    started = launch()
-    yield started
-    started.close()
+        started = play.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        yield started
+        started.close()
 
 
 @pytest.fixture

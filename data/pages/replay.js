@@ -47,12 +47,12 @@ function view(w, h) {
   return [scale, p => [w / 2 + (p[1] - centre[1]) * scale, h / 2 - (p[0] - centre[0]) * scale], centre];
 }
 
-// Its places up to a row, with a break where it is not known.
-function pieces(way, end) {
+// Places up to a row, its own or those that a function gives for a row, with a break where nothing is known.
+function pieces(way, end, at = i => way.p[i]) {
   const found = [];
   for (let i = 0; i <= end; i++) {
     if (i && way.t[i] - way.t[i - 1] > way.gap) found.push([null]);
-    found.push(way.p[i]);
+    found.push(at(i));
   }
   return found;
 }
@@ -189,7 +189,7 @@ function drawStrips() {
     ctx.setLineDash([]);
     for (const [one, values] of series) {
       if (one.dots) { ctx.fillStyle = one.colour; values.forEach((v, i) => { if (v !== null) ctx.fillRect(x(one.t[i]) - 1, y(v) - 1, 2.5, 2.5); }); }
-      else line(ctx, p => p, one.t.map((t, i) => values[i] === null ? [null] : [x(t), y(values[i])]), one.colour, 1.2, 1);
+      else line(ctx, p => p, pieces(one, values.length - 1, i => values[i] === null ? [null] : [x(one.t[i]), y(values[i])]), one.colour, 1.2, 1);
     }
     ctx.fillStyle = colour("ink"); ctx.textAlign = "left"; ctx.fillText(label, left, k * each + 15);
   });
