@@ -138,6 +138,14 @@ def test_it_plays_and_zooms_in_a_browser(browser: Any, faults: Callable[[Path], 
     broken: list[str] = []
     opened.on("pageerror", lambda error: broken.append(str(error)))
     opened.goto(file.as_uri())
+    # North is up and east to the right; between two places lies their mean, and nothing where there is a gap.
+    (x, y), (right, _), (_, up) = (
+        opened.evaluate(f"view(500, 400)[1]({place})") for place in ("[0, 0]", "[0, 9]", "[9, 0]")
+    )
+    assert right > x and up < y and right - x == pytest.approx(y - up)
+    assert opened.evaluate("place({t: [0, 1], p: [[0, 0], [4, 8]], gap: 5}, 0.25)") == [1, 2]
+    assert opened.evaluate("place({t: [0, 99], p: [[0, 0], [4, 8]], gap: 5}, 50)") is None
+    assert opened.evaluate("last([0, 1, 1, 3], 1)") == 2 and opened.evaluate("last([1], 0)") == -1
     pictures = [opened.locator("#map").screenshot()]
     opened.locator("#time").fill("30")
     pictures.append(opened.locator("#map").screenshot())
