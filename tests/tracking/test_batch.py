@@ -72,12 +72,14 @@ def test_pixels():
 
 
 def test_schmidt(rng):
-    runs = 4
+    runs = 6
     times, z, poses = flight(runs)
     covariance = np.array([[random_pose_covariance(rng, 0.2) for _ in range(N)] for _ in range(runs)])
     covariance[1, 20] = np.nan
     covariance[2, :, 2] = covariance[2, :, :, 2] = 0.0
     covariance[3] = 0.0
+    covariance[4:] = 9 * covariance[0]  # in proportion, and all but for one row
+    covariance[5, 7] /= 2
     start = Start(0.0, np.zeros(4), np.diag([25.0, 25, 9, 9]))
     R = np.tile(np.diag([4.0, 6.0]), (N, 1, 1))
     view, sensor = BatchCamera(poses, 0.0), m.pixels(poses, 0.0)

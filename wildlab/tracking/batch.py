@@ -100,7 +100,7 @@ def run_batch(
         covariance = np.asarray(pose.covariance, float)
         check_rows(covariance.shape[-3] if covariance.ndim > 2 else 1, N, "pose.covariance")
         P_poses = np.array(covariance if covariance.ndim == 4 else covariance[None], order="C")
-        phis = np.array([schmidt.transitions_of_pose(one) for one in P_poses])
+        phis = _transitions(P_poses)
         unknown = ~np.isfinite(P_poses).all(axis=(2, 3))
         z[np.broadcast_to(unknown, (B, N))] = np.nan
         P_poses[unknown] = 0.0
@@ -130,6 +130,21 @@ def run_batch(
         Track(given.times, x[i], P[i], innovation[i], S, nis[i], used[i], chosen[i], limited[i])
         for i in range(B)
     ]
+
+
+def _transitions(covariances: Array) -> Array:
+    """(B, N, k, k) `schmidt.transitions_of_pose` of each run's covariances (B, N, k, k).
+
+    Units do not matter to them, so runs whose covariances are in proportion share theirs.
+    """
+    largest = np.abs(np.nan_to_num(covariances)).max(axis=(1, 2, 3), keepdims=True)
+    unit = covariances / np.maximum(largest, np.finfo(float).tiny)
+    found: list[Array] = []
+    for k, one in enumerate(unit):
+        same = (j for j in range(k) if np.allclose(one, unit[j], rtol=1e-12, atol=0, equal_nan=True))
+        like = next(same, None)
+        found.append(schmidt.transitions_of_pose(covariances[k]) if like is None else found[like])
+    return np.array(found)
 
 
 def _camera_arrays(

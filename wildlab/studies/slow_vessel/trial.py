@@ -21,10 +21,9 @@ from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.target_motion import target_path
 from wildlab.simulation.twins import simulate_twin
 from wildlab.studies.static_point.trial import differ, table_numbers
+from wildlab.tracking.batch import run_batch
 from wildlab.tracking.initiation import start_from_first
 from wildlab.tracking.motion import constant_velocity, in_steps
-from wildlab.tracking.run import run_filter
-from wildlab.tracking.sensors import positions
 
 #: Navigation source behind each column of the tables.
 COLUMNS = {"observer": "observer", "pixhawk-autopilot": "autopilot"}
@@ -92,11 +91,10 @@ def track_vessel(scored: pd.DataFrame) -> VesselEstimates:
     times, xy = table["time_s"].to_numpy(float), table[["north_m", "east_m"]].to_numpy(float)
     measured = errors_of(table)
     motion = partial(constant_velocity, sd_acceleration=SD_ACCELERATION)
-    track = run_filter(
+    (track,) = run_batch(
         times,
-        xy,
+        xy[None],
         np.eye(2) * SD_MEASUREMENT**2,
-        positions(),
         lambda dt: in_steps(dt, motion, STEP_S),
         start_from_first(times, xy, SD_POSITION_0, SD_VELOCITY_0),
     )
