@@ -310,7 +310,7 @@ def sight_from(
     def sight(places: Array) -> Array:
         flat = places.reshape(-1, 2)
         out = np.zeros(len(flat))
-        near = np.flatnonzero(((flat - middle) ** 2).sum(axis=1) < radius**2)
+        near = np.flatnonzero(np.hypot(*(flat - middle).T) < radius)
         if len(near):
             out[near] = detector.detected * shown(terrain, camera, p_nc, R_nc, flat[near], detector)
         return out.reshape(places.shape[:-1])

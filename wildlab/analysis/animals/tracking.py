@@ -161,9 +161,9 @@ class Particles:
         self.herd, names = step_nearest(self.herd, look, self.rules, self._rng)
         self._moments = moments(self.herd.cloud)
         new = self.herd.cloud.x[len(self._home) :, :, :2]
-        # Where most of a new cloud lies; outside all fences none keeps it.
-        shares = np.array([fence(new).mean(axis=1) for fence in self._fences]).reshape(len(self._fences), -1)
         if len(new):
+            # Where most of a new cloud lies; outside all fences none keeps it.
+            shares = np.array([fence(new).mean(axis=1) for fence in self._fences])
             home = np.where(shares.max(axis=0) > 0, shares.argmax(axis=0), -1)
             self._home = np.append(self._home, home.astype(np.intp))
         return names
@@ -193,7 +193,7 @@ class Particles:
         if not self.rules.negative or not len(self.herd.identity):
             return np.full(len(self.herd.identity), -np.inf)
         off = self.herd.cloud.x[..., :2] - self._moments[0][:, None, :2]
-        return np.sqrt((off**2).sum(axis=-1).max(axis=1))
+        return np.hypot(off[..., 0], off[..., 1]).max(axis=1)
 
 
 class Kalman:
