@@ -13,6 +13,7 @@ from wildlab.commands import shared
 from wildlab.commands.shared import ANY, FILE, FOLDER, refuse_existing, terminal_console
 from wildlab.errors import WildlabError
 from wildlab.paths import REPORTS
+from wildlab.runner.processes.ending import start_server
 from wildlab.terminal import shown, stopped
 
 if TYPE_CHECKING:
@@ -42,6 +43,7 @@ def evaluate(
       wildlab evaluate flights/antenna --source autopilot
       wildlab evaluate flights/wednesday --calibration calibration.toml
     """
+    start_server()
     from wildlab.runner.evaluate import evaluate_flight, left_from_before
 
     outcomes = evaluate_flight(
@@ -167,6 +169,7 @@ def track(
       wildlab track flights/harbour --settings settings.toml --target boat --sensor radar
       wildlab track flights/harbour --many --settings settings.toml
     """
+    start_server()
     from wildlab.runner.track import refuse_unfit, track_flight, track_many
 
     console = terminal_console()

@@ -13,6 +13,7 @@ import click
 from wildlab.commands import shared
 from wildlab.commands.shared import ANY, FILE, FOLDER, terminal_console
 from wildlab.errors import WildlabError
+from wildlab.runner.processes.ending import start_server
 from wildlab.terminal import count, print_json, sentence, shown
 
 #: Where a password may stand that nobody types: never on the command line, which others can see.
@@ -63,6 +64,7 @@ def share(
       wildlab share reports/tuesday --for partner --encrypt
       wildlab share reports --for team --zip
     """
+    start_server()
     from wildlab.sharing.share import share as make
 
     made = make(

@@ -10,6 +10,7 @@ import click
 
 from wildlab.commands import shared
 from wildlab.commands.shared import FOLDER, terminal_console
+from wildlab.runner.processes.ending import start_server
 from wildlab.terminal import count, print_json, print_table, shown
 
 jobs = click.option("--jobs", type=click.IntRange(1), default=1, show_default=True, help="Processes.")
@@ -135,6 +136,7 @@ def run(
       wildlab run static-point --seeds 200 --jobs 4
       wildlab run static-point --scheduler tcp://127.0.0.1:8786
     """
+    start_server()
     from wildlab.runner.run import run_studies
 
     if everything and studies:

@@ -13,6 +13,7 @@ again that the first one had. Whenever it is broken off, every page that is ther
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from pathlib import Path
@@ -42,6 +43,8 @@ from wildlab.runner.seeds import SeedWork, code_key, make_work, missing_seeds, p
 
 #: Guessed seconds of a study that has not been run here yet. Only their order matters.
 GUESSED_S = {"computed": 5.0, "logged": 30.0, "twin": 60.0}
+#: How old the ledger may be when a study ends, s: it takes a second to write, and a front page to look up.
+LEDGER_EVERY_S = 10.0
 THERE = "its full report is there already, from the same code, data and parameters"
 
 
@@ -276,7 +279,7 @@ def run_all(
 ) -> list[Outcome]:
     """Run what was made ready, one pass after the other, and show how it goes; outcomes as of `run_studies`.
 
-    The ledger is written before anything else, and after each study: whenever this is broken off, it says
+    The ledger is written before anything else, from time to time, and at the end, however that comes: it says
     what is there.
     """
     if console is not None:
@@ -285,25 +288,26 @@ def run_all(
         for outcome in skipped:
             console.print(outcome_line(outcome), highlight=False, soft_wrap=True)
     build_ledger(reports, studies)
+    written = time.monotonic()
     outcomes: dict[str, Outcome] = {}
-    for jobs in filter(None, passes):
-        if console is not None and (line := pass_line(jobs)):
-            console.print(line, highlight=False, soft_wrap=True)
-        with shown(console) if console is not None else nullcontext() as listen:
+    try:
+        for jobs in filter(None, passes):
+            if console is not None and (line := pass_line(jobs)):
+                console.print(line, highlight=False, soft_wrap=True)
+            with shown(console) if console is not None else nullcontext() as listen:
 
-            def tell(name: str, event: str, what: Any, listen: Listener | None = listen) -> None:
-                if event == "end":
-                    build_ledger(reports, studies)
-                if listen is not None:
-                    listen(name, event, what)
+                def tell(name: str, event: str, what: Any, listen: Listener | None = listen) -> None:
+                    nonlocal written
+                    if event == "end" and time.monotonic() - written > LEDGER_EVERY_S:
+                        build_ledger(reports, studies)
+                        written = time.monotonic()
+                    if listen is not None:
+                        listen(name, event, what)
 
-            try:
                 ended = run_jobs(jobs, parallel=parallel, scheduler=scheduler, listen=tell)
-            except BaseException:
-                # A page may have come into place, and the ledger not have been written since.
-                build_ledger(reports, studies)
-                raise
             outcomes |= {outcome.name: outcome for outcome in ended}
+    finally:
+        build_ledger(reports, studies)
     return [*outcomes.values(), *skipped]
 
 

@@ -7,7 +7,7 @@ import multiprocessing
 import os
 import signal
 from collections.abc import Callable, Iterator
-from multiprocessing import resource_tracker
+from multiprocessing import forkserver, resource_tracker
 from multiprocessing.process import BaseProcess
 from typing import Any
 
@@ -37,15 +37,27 @@ _PRELOADED = (
     "matplotlib.figure",
     "nbformat",
     "IPython.core.interactiveshell",
+    "pydantic",
+    "pyarrow.parquet",
+    "pymap3d",
+    "jinja2",
+    "bs4",
 )
+
+
+def start_server() -> None:
+    """Start what processes are forked from, where the system can fork: it loads packages in the meantime."""
+    if "forkserver" in multiprocessing.get_all_start_methods():
+        forkserver.set_forkserver_preload(list(_PRELOADED))
+        with one_thread(), _uninterrupted():
+            forkserver.ensure_running()
 
 
 def start_process(name: str, target: Callable[..., None], *arguments: Any) -> BaseProcess:
     """Start a process on one thread, with this one's environment, and nothing else of its memory."""
+    start_server()
     fork = "forkserver" in multiprocessing.get_all_start_methods()
     context: Any = multiprocessing.get_context("forkserver" if fork else "spawn")
-    if fork:
-        context.set_forkserver_preload(list(_PRELOADED))
     with one_thread(), _uninterrupted():
         given = (dict(os.environ), target, *arguments)
         process: BaseProcess = context.Process(target=_begin, args=given, name=name)
