@@ -21,7 +21,7 @@ BLOCKS = np.repeat(np.arange(12), 5)
 USED = np.ones(60, bool)
 #: White errors of a metre.
 POINTS = PosePoints(np.zeros((60, 2, 6)), np.tile(np.eye(2), (60, 1, 1)), np.zeros((60, 2, 2)), BLOCKS * 1.0)
-WHITE = WanderNoise(dict.fromkeys(KINDS, 1.0), 0.5, (60.0, 20.0))
+WHITE = WanderNoise(dict.fromkeys(KINDS, 1.0), 0.5, (60.0, 20.0, 20.0))
 SHIFT = np.tile(np.eye(2), (60, 1, 1))
 
 

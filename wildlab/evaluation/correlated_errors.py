@@ -3,10 +3,11 @@
 The errors of N points are ``r = J x + Z m + G a + e``. ``J x`` are constants that all images share, ``Z m``
 the errors of the places of things, ``e`` is each point's own (pixel and ground height), and ``a`` is the pose
 error of its image: position in n and rotation vector in n. Part of ``a`` is each image's own, the rest is a
-first-order Gauss-Markov process, whose correlation falls by e in a time constant. A constant counts only
+first-order Gauss-Markov process, whose correlation falls by e in a time constant, one of positions, tilts
+and headings each: a heading is seen less well than a tilt, and wanders for longer. A constant counts only
 against that: what wanders for longer than a flight looks constant in it.
 
-The standard deviations, the share that wanders and its time constant maximise the likelihood of what neither
+The standard deviations, the share that wanders and its time constants maximise the likelihood of what neither
 ``J x`` nor ``Z m`` can explain (REML: Patterson and Thompson 1971), with a broad prior about what was
 assumed.
 """
@@ -28,9 +29,11 @@ Array = NDArray[np.float64]
 
 #: Standard deviation of the prior on the logit of the share.
 PRIOR_SHARE = 1.5
-#: Time constants of positions and attitudes about which their priors lie, s: minutes for a satellite fix,
-#: tens of seconds for an attitude (H 5.6). Where images have no times, images.
-LASTS_S, LASTS_IMAGES = (60.0, 20.0), (10.0, 3.0)
+#: Time constants of positions, tilts and headings about which their priors lie, s: minutes for a satellite
+#: fix, tens of seconds for an attitude (H 5.6). Where images have no times, images.
+LASTS_S, LASTS_IMAGES = (60.0, 20.0, 20.0), (10.0, 3.0, 3.0)
+#: Which of them each of the six pose errors has.
+_LASTS = [0, 0, 0, 1, 1, 2]
 
 
 class PosePoints(NamedTuple):
@@ -85,25 +88,25 @@ class WanderNoise(NamedTuple):
     share
         Of the variance of pose errors that wanders; the rest is each image's own.
     lasts
-        Time constants of what wanders in positions and in attitudes, s.
+        Time constants of what wanders in positions, tilts and headings, s.
     """
 
     sd: dict[str, float]
     share: float
-    lasts: tuple[float, float]
+    lasts: tuple[float, float, float]
 
     @property
     def logarithms(self) -> Array:
-        """(8,) of standard deviations and time constants, and the logit of the share."""
+        """(9,) of standard deviations and time constants, and the logit of the share."""
         logit = np.log(self.share / (1 - self.share))
         return np.append(np.log([*self.sd.values(), *self.lasts]), logit)
 
     @staticmethod
     def from_logarithms(x: Array) -> WanderNoise:
-        """The noise whose logarithms (8,) these are."""
-        *sd, position, attitude = map(float, np.exp(x[:-1]))
+        """The noise whose logarithms (9,) these are."""
+        *sd, position, tilt, heading = map(float, np.exp(x[:-1]))
         share = float(1 / (1 + np.exp(-x[-1])))
-        return WanderNoise(dict(zip(KINDS, sd, strict=True)), share, (position, attitude))
+        return WanderNoise(dict(zip(KINDS, sd, strict=True)), share, (position, tilt, heading))
 
 
 class WanderFit(NamedTuple):
@@ -114,7 +117,7 @@ class WanderFit(NamedTuple):
     noise
         The most likely one.
     posterior
-        Negative logarithm of the posterior of its logarithms (8,).
+        Negative logarithm of the posterior of its logarithms (9,).
     """
 
     noise: WanderNoise
@@ -148,7 +151,7 @@ class Covariance:
         sd = np.array([noise.sd[kind] for kind, axes in KINDS.items() for _ in axes])
         self._G = points.derivatives[self._order] * sd
         self._own = (points.own + noise.sd["pixel"] ** 2 * points.pixel)[self._order]
-        self._rho = np.minimum(np.exp(-np.diff(when)[:, None] / np.repeat(noise.lasts, 3)), 1 - 1e-6)
+        self._rho = np.minimum(np.exp(-np.diff(when)[:, None] / np.take(noise.lasts, _LASTS)), 1 - 1e-6)
         self._share = noise.share
         self._places = None if places is None else (np.unique(places.of, return_inverse=True)[1], places.sd)
 
@@ -234,7 +237,7 @@ def estimate_wander(
     r: ArrayLike,
     J: ArrayLike,
     assumed: dict[str, float],
-    lasts: tuple[float, float] = LASTS_S,
+    lasts: tuple[float, float, float] = LASTS_S,
     places: KnownPlaces | None = None,
 ) -> WanderFit:
     """Most likely noise behind residuals, whatever constants are behind them too.
