@@ -11,8 +11,7 @@ from wildlab.analysis.tracks.initiation import start_near
 from wildlab.analysis.tracks.noise_model import SensorTuning, noise_of_tuning
 from wildlab.analysis.tracks.scans import errors_near, scans_of, sensors_of, truths_at
 from wildlab.analysis.tracks.single_target import SensorTrack
-from wildlab.studies.autoferry import BOATS, tune_sensor
-from wildlab.studies.autoferry.comparison import follow_flight, tracks_table
+from wildlab.studies.autoferry import BOATS, follow_flight, tracks_table, tune_sensor
 
 EXACT = {"kind": "position", "range_sd": 0.0, "bearing_sd_deg": 0.0, "position_sd": 0.0}
 

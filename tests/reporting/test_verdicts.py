@@ -22,7 +22,6 @@ from wildlab.reporting.status import (
     standing,
 )
 from wildlab.studies import monte_carlo
-from wildlab.studies.protocol import Study
 
 
 def number(closeness: Closeness, compatibility: Compatibility, fitted: str = "") -> Comparison:
@@ -89,9 +88,8 @@ def test_flights_on_a_printed_number_count_by_halves():
 def test_metrics_follow_the_number_of_flights(n):
     values = FLIGHTS[:n]
     spread = pd.DataFrame({("kf", "mae"): values})
-    study = Study("x", unit_of=lambda name: "m")
     report = open_report(study="linear-vs-nonlinear-fast", kind="twin")
-    monte_carlo.record_spread(report, study, spread, {})
+    monte_carlo.record_spread(report, lambda name: "m", spread, {})
     (entry,) = report._metrics
     assert (entry["low"], entry["high"]) == (bounds_of(values) if n > 1 else (None, None))
     assert entry["value"] == values.median()

@@ -12,8 +12,11 @@ import sys
 from pathlib import Path
 
 from wildlab import studies
+from wildlab.studies import rules
 
-studies.__path__.append(str(Path(__file__).resolve().parent / "cases"))
+CASES = Path(__file__).resolve().parent / "cases"
+studies.__path__.append(str(CASES))
+rules.FOLDERS.append(CASES)
 
 
 def main() -> None:

@@ -77,9 +77,9 @@ def test_the_code_key_follows_code_twins_and_versions(tmp_path, monkeypatch):
         "wildlab/tracking/a.py",
         "wildlab/flight/readers/b.py",
         "data/twins/parts/c.toml",
-        "wildlab/studies/schmidt/trial.py",
+        "wildlab/studies/schmidt.py",
         "wildlab/cli.py",
-        "wildlab/studies/schmidt/text.py",
+        "wildlab/studies/page.py",
     )
     for name in files:
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)

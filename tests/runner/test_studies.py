@@ -12,9 +12,9 @@ import pandas as pd
 import pytest
 
 from tests.page_words import MOST_IN_ANSWER, MOST_WORDS, words_in_sight
+from tests.studies.claims import checks_of
 from wildlab.analysis.navigate import TUNINGS
 from wildlab.evaluation.consistency import white_bound
-from wildlab.evaluation.shares import Check
 from wildlab.flight.recipe.importing import import_flight
 from wildlab.paths import DATA
 from wildlab.reporting.published import load_claims, load_published
@@ -22,8 +22,6 @@ from wildlab.runner.catalogue import StudyEntry, load_studies
 from wildlab.runner.evaluate import evaluate_flight
 from wildlab.runner.run import run_studies
 from wildlab.sharing.document import read_part
-from wildlab.studies.line_of_sight import WAYS
-from wildlab.studies.line_of_sight.trial import HEIGHTS, VIEW
 from wildlab.studies.printed_numbers import all_pairs
 from wildlab.studies.protocol import run_trial, split_keys
 
@@ -183,18 +181,16 @@ PAGES = {
     "slow-vessel": Page(2),
     "replay": Page(2),
 }
-#: What a notebook tells a case's claims besides the flights.
+#: What a notebook tells the rules of claims besides the flights; and whom it calls so.
 TOLD = {
-    "line-of-sight": {
-        "times": pd.DataFrame(
-            1.0, index=range(3), columns=pd.MultiIndex.from_product([(*WAYS, VIEW), HEIGHTS])
-        )
-    },
+    "line-of-sight": dict.fromkeys(
+        (f"times/{one}" for one in ("ray-casting", "whole-rays", "cheap", "dear")), np.ones(3)
+    ),
     "static-point": {"bound": white_bound(551)},
-    "navigation": {"tuned": next(iter(TUNINGS))},
     "information-planning": {"loads": np.full(3, 1e-3)},
     "wildlife-tracking": {"cost": np.full(3, 9.0)},
 }
+TUNED = {next(iter(TUNINGS)): "tuned"}
 
 
 @pytest.mark.parametrize("name", PAGES)
@@ -236,13 +232,14 @@ def trial_gives_what_is_asked(entry: StudyEntry, folder: Path) -> None:
     again = run_trial(entry.case, seeds["seeds"][0], seeds["parameters"])
     np.testing.assert_equal(again, numbers)
     case = entry.shown_case()
-    assert case is not None and case.unit_of is not None and case.check_claims is not None
+    assert case is not None
     keys = split_keys(numbers)
-    assert any(case.unit_of(name) for _, name in keys)
+    assert any(case.rules.unit_of(name) for _, name in keys)
     spread = pd.DataFrame([keys] * 3)
     thresholds = {claim["id"]: claim.get("threshold") for claim in load_claims(entry.name)}
-    for claim, given in case.check_claims(spread, **TOLD.get(entry.case, {})).items():
-        check = Check.of(given)
+    checks = checks_of(str(entry.case), spread.rename(columns=TUNED, level=0), TOLD.get(str(entry.case)))
+    assert {claim["id"] for claim in load_claims(entry.name) if "needs" not in claim} <= set(checks)
+    for claim, check in checks.items():
         threshold = thresholds.get(claim, 1.0 if check.measured is not None else None)
         array = np.asarray(check.holds(None if threshold is None else float(threshold)))
         assert array.shape == (3,) and array.dtype == bool, claim

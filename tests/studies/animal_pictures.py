@@ -16,7 +16,7 @@ from wildlab.simulation.scene import (
     sensor_of,
 )
 from wildlab.simulation.scene.response import expose, to_counts
-from wildlab.studies.wildlife_detection.trial import (
+from wildlab.studies.wildlife_detection import (
     Picture,
 )
 

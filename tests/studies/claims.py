@@ -2,8 +2,17 @@
 
 from collections.abc import Mapping
 
+import pandas as pd
+from numpy.typing import ArrayLike
+
 from wildlab.evaluation.shares import Check
 from wildlab.reporting.published import load_claims
+from wildlab.studies.protocol import find_case
+
+
+def checks_of(case: str, runs: pd.DataFrame, more: Mapping[str, ArrayLike] | None = None) -> dict[str, Check]:
+    """What flights give for the claims of a case; ``more`` numbers as a notebook has them."""
+    return find_case(case).checks(runs, more)
 
 
 def said(study: str, checks: Mapping[str, Check]) -> dict[str, list[bool]]:

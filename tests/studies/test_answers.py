@@ -12,8 +12,9 @@ from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY, MOSTLY_NOT, UNDECIDA
 from wildlab.messages.catalogue import FOLDER, load_texts
 from wildlab.paths import PACKAGE
 from wildlab.studies.page import Facts
-from wildlab.studies.protocol import case_names, find_case
-from wildlab.studies.static_point.trial import COLUMNS as STATIC_COLUMNS
+from wildlab.studies.protocol import case_names
+from wildlab.studies.rules import load_rules
+from wildlab.studies.static_point import COLUMNS as STATIC_COLUMNS
 
 #: Recorded numbers by "subject/name" (a number, or an entry), and claims' verdicts by their id (alone, or
 #: with the interval of their share) -> the keys of the sentences.
@@ -436,7 +437,7 @@ ANSWERS: dict[str, list[Case]] = {
         (many(14.0, 0), ("boats-lost",)),
     ],
 }
-CASES = [name for name in case_names() if find_case(name).answer is not None]
+CASES = [name for name in case_names() if load_rules(name).answer]
 
 
 def facts_of(given: Mapping[str, Any]) -> Facts:
@@ -456,17 +457,14 @@ def facts_of(given: Mapping[str, Any]) -> Facts:
     ("case", "given", "keys"), [(c, *one) for c, many in ANSWERS.items() for one in many]
 )
 def test_the_facts_choose_the_sentences(case, given, keys):
-    answer = find_case(case).answer
-    assert answer is not None
-    assert tuple(answer(facts_of(given))) == keys
+    assert tuple(load_rules(case).answers(facts_of(given))) == keys
 
 
 @pytest.mark.parametrize("case", CASES)
 def test_every_sentence_can_be_chosen_and_every_chosen_one_is_there(case):
     """Where no fact is known it is one that needs none."""
-    answer, texts = find_case(case).answer, load_texts(case).answers
-    assert answer is not None
-    unknown = answer(facts_of({}))
+    rules, texts = load_rules(case), load_texts(case).answers
+    unknown = rules.answers(facts_of({}))
     assert unknown and all(key.endswith(("unknown", "missing")) and "{" not in texts[key] for key in unknown)
     assert {key for _, keys in ANSWERS[case] for key in keys}.union(unknown) == set(texts)
 

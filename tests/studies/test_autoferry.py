@@ -9,8 +9,8 @@ import pytest
 
 from wildlab.analysis.tracks.noise_model import SensorTuning
 from wildlab.flight.store import Flight
-from wildlab.studies.autoferry import BOATS
-from wildlab.studies.autoferry.comparison import (
+from wildlab.studies.autoferry import (
+    BOATS,
     FILTERS,
     OUTCOMES,
     choose_filter,

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pandas as pd
 
-from wildlab.studies.autoferry.comparison import (
+from tests.studies.claims import checks_of
+from wildlab.studies.autoferry import (
     MOSTLY,
     OUTCOMES,
     PRICE,
     beside_white,
-    check_claims,
     choose_filter,
     kept_cases,
     of_use,
@@ -141,15 +141,15 @@ def test_claims_are_decided_case_by_case_and_means_by_the_band_of_a_mean():
             row("c", "coloured", NAN, rmse=NAN),
         ]
     )
-    checks = check_claims(table, KEYS)
-    assert checks["white-noise-overconfident"].tolist() == [True, False]
-    assert checks["white-noise-nis-within"].tolist() == [True, False]
-    assert checks["white-noise-nis-low"].tolist() == [False, True]
-    assert checks["differencing-whitens"].tolist() == [True, False]
-    assert checks["differencing-nearer-ideal"].tolist() == [True, False]
-    assert checks["differencing-costs-accuracy"].tolist() == [True, False]
-    assert checks["schmidt-nearer-ideal"].tolist() == [True, False]
-    assert checks["schmidt-as-accurate"].tolist() == [False, True]
+    checks = checks_of("autoferry", table)
+    assert checks["white-noise-overconfident"].holds().tolist() == [True, False]
+    assert checks["white-noise-nis-within"].holds().tolist() == [True, False]
+    assert checks["white-noise-nis-low"].holds().tolist() == [False, True]
+    assert checks["differencing-whitens"].holds().tolist() == [True, False]
+    assert checks["differencing-nearer-ideal"].holds().tolist() == [True, False]
+    assert checks["differencing-costs-accuracy"].holds().tolist() == [True, False]
+    assert checks["schmidt-nearer-ideal"].holds().tolist() == [True, False]
+    assert checks["schmidt-as-accurate"].holds().tolist() == [False, True]
 
 
 def test_only_cases_that_white_noise_keeps_decide():

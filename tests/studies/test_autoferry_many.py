@@ -12,8 +12,7 @@ from wildlab.evaluation.identities import Moment, compare_identities
 from wildlab.flight.files import dump_toml
 from wildlab.flight.tracking_settings import parse_settings
 from wildlab.studies import autoferry_many
-from wildlab.studies.autoferry_many import tuning
-from wildlab.studies.autoferry_many.tuning import Tuned, anees_of, draw, order
+from wildlab.studies.autoferry_many import Tuned, anees_of, draw, order
 
 OFFSETS = {"lidar": -1.0, "radar": -2.0, "ir": -0.5, "eo": 0.0}
 ERRORS = {
@@ -78,9 +77,9 @@ def test_what_is_assumed_of_the_truth_chooses_no_draw():
 
 @pytest.mark.slow
 def test_scenarios_are_followed_by_what_one_teaches(scenario, tunings, monkeypatch):  # type: ignore[no-untyped-def]
-    monkeypatch.setattr(tuning, "tune_sensor", lambda flight, sensor: tunings[sensor])
-    errors = tuning.errors_of(scenario(2))
+    monkeypatch.setattr(autoferry_many, "tune_sensor", lambda flight, sensor: tunings[sensor])
+    errors = autoferry_many.errors_of(scenario(2))
     assert -2.5 < errors["radar"].offset_s < -1.5 and -1.5 < errors["lidar"].offset_s < -0.5
     assert all(0.5 < errors[name].next_correlation < 1 for name in ("lidar", "radar"))
-    for mode, best in tuning.tune(scenario(2), draws=2, seed=1).items():
-        assert tuning.follow_mode(scenario(3), mode, best.settings) is not None
+    for mode, best in autoferry_many.tune(scenario(2), draws=2, seed=1).items():
+        assert autoferry_many.follow_mode(scenario(3), mode, best.settings) is not None

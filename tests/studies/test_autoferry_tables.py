@@ -11,7 +11,7 @@ from wildlab.analysis.tracks.single_target import SensorTrack
 from wildlab.messages.catalogue import load_texts
 from wildlab.reporting.report import Report, open_report
 from wildlab.studies import autoferry
-from wildlab.studies.autoferry.comparison import COMPARED, KEYS, of_use, outcomes, tracks_table
+from wildlab.studies.autoferry import COMPARED, KEYS, of_use, outcomes, tracks_table
 
 NAMES = load_texts("autoferry").subjects
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from wildlab.studies.camera_calibration import calibration
-from wildlab.studies.camera_calibration.calibration import (
+from wildlab.studies import camera_calibration
+from wildlab.studies.camera_calibration import (
     calibrations,
     measure_centres,
     theoretical,
@@ -30,22 +30,22 @@ def test_calibrations_spread_as_they_state():
 
 
 def test_the_room_without_errors_gives_the_printed_angles():
-    one, angle = calibration.calibrate_once(np.random.default_rng(4), "clicks", 0.0)
+    one, angle = camera_calibration.calibrate_once(np.random.default_rng(4), "clicks", 0.0)
     assert angle < 1e-8
     np.testing.assert_allclose(
-        np.degrees(calibration.printed_angles(one)), PRINTED_MISALIGNMENT_DEG, atol=1e-6
+        np.degrees(camera_calibration.printed_angles(one)), PRINTED_MISALIGNMENT_DEG, atol=1e-6
     )
 
 
-@pytest.mark.parametrize("cause", calibration.CAUSES)
+@pytest.mark.parametrize("cause", camera_calibration.CAUSES)
 def test_each_cause_is_sized_to_leave_what_is_printed(cause):
-    one = calibration.explain(np.random.default_rng(5), cause, 4)
-    assert one.left == pytest.approx(calibration.PRINTED_ERROR, rel=0.5)
+    one = camera_calibration.explain(np.random.default_rng(5), cause, 4)
+    assert one.left == pytest.approx(camera_calibration.PRINTED_ERROR, rel=0.5)
     assert one.ground == pytest.approx(350 * np.tan(one.angle))
 
 
 def test_the_printed_error_at_the_height_of_the_flight():
-    found = calibration.error_from_height()
+    found = camera_calibration.error_from_height()
     assert found.estimate == pytest.approx(6.68, abs=0.005)
     # The corners of what 0.0229 m and 1.2 m are rounded from, to first order.
     assert found.low == pytest.approx(0.02285 * 350 / 1.25, abs=0.02)

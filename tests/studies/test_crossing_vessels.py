@@ -4,12 +4,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.studies.claims import turn
+from tests.studies.claims import checks_of, turn
 from wildlab.analysis.georeference import observe
 from wildlab.simulation.twins import simulate_twin
-from wildlab.studies.crossing_vessels import check_claims
-from wildlab.studies.crossing_vessels import trial as study
-from wildlab.studies.crossing_vessels.trial import (
+from wildlab.studies import crossing_vessels as study
+from wildlab.studies.crossing_vessels import (
     DISTANCE,
     FEATURES,
     LOOKS,
@@ -24,6 +23,7 @@ from wildlab.studies.crossing_vessels.trial import (
     track,
     wrong_of,
 )
+from wildlab.studies.rules import load_rules
 from wildlab.tracking.association import Appearance
 from wildlab.tracking.many.bank import Bank, Looks
 
@@ -159,7 +159,7 @@ def test_detections_are_dressed_from_their_own_vessel():
 @pytest.mark.slow
 def test_numbers_are_those_of_the_tracks(flown):
     numbers = all_numbers(flown)
-    assert {name for _, name in numbers} == set(study.UNITS)
+    assert all(load_rules("crossing-vessels").unit_of(name) for _, name in numbers)
     seen = np.bincount(flown.crossing.boat)
     for rule, bank in flown.banks.items():
         wrong = wrong_of(flown.crossing, bank)
@@ -197,12 +197,13 @@ BAD = {
 
 
 def test_claims_turn_with_the_numbers():
-    assert turn("crossing-vessels", check_claims(spread_of(GOOD)), check_claims(spread_of(GOOD | BAD)))
+    good, bad = (checks_of("crossing-vessels", spread_of(one)) for one in (GOOD, GOOD | BAD))
+    assert turn("crossing-vessels", good, bad)
 
 
 def test_premises_turn_with_the_numbers():
     def met(changes):
-        checks = check_claims(spread_of(GOOD | changes))
+        checks = checks_of("crossing-vessels", spread_of(GOOD | changes))
         return {key for key, check in checks.items() if check.premise is not None and check.premise.all()}
 
     crossed = {"swap-without-features", "no-swap-with-features", "most-correct-in-contrast"}

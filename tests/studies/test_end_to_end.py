@@ -4,20 +4,18 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.studies.claims import turn
+from tests.studies.claims import checks_of, turn
 from wildlab.evaluation.shares import Check
 from wildlab.reporting.published import load_claims
+from wildlab.studies import coloured_noise as coloured
 from wildlab.studies import end_to_end
-from wildlab.studies.coloured_noise import trial as coloured
-from wildlab.studies.end_to_end.trial import (
+from wildlab.studies.end_to_end import (
     COLOURED,
     DRAWN,
     KINDS,
     RENDERED,
     STUDY_OF,
     TWO_FILTERS,
-    check_claims,
-    checks_of,
     fly,
     numbers_of,
     of_kind,
@@ -77,12 +75,12 @@ def test_the_detector_is_nearer_than_what_the_twin_draws(numbers):
 def test_every_claim_of_the_cases_is_checked_with_both(numbers):
     spread = spread_of(numbers)
     for kind in KINDS:
-        checks = checks_of(spread, kind)
+        checks = end_to_end.checks_of(spread, kind)
         assert set(checks) == {TWO_FILTERS, COLOURED}
         for case, found in checks.items():
             assert {claim["id"] for claim in load_claims(STUDY_OF[case, TWIN])} <= set(found)
     slow = spread[[key for key in spread if key[0] in KINDS or key[0].endswith(("kf", "measurements"))]]
-    assert set(checks_of(slow, DRAWN)) == {TWO_FILTERS}
+    assert set(end_to_end.checks_of(slow, DRAWN)) == {TWO_FILTERS}
     assert ("kf", "mae") in of_kind(spread, RENDERED)
 
 
@@ -110,9 +108,8 @@ def test_own_claims_follow_the_numbers(numbers):
     apart = alike | {("rendered-singer", "mae"): 20.0}
     biased = {(RENDERED, "bias_ahead"): -2.0, (RENDERED, "bias_right"): 0.0, (RENDERED, "pixel_sd"): 1.0}
     noisy = {(RENDERED, "bias_ahead"): 0.1, (RENDERED, "bias_right"): 0.0, (RENDERED, "pixel_sd"): 1.0}
-    checks = [
-        check_claims(spread_of(numbers, one)) for one in (better | alike | biased, worse | apart | noisy)
-    ]
+    turned = (better | alike | biased, worse | apart | noisy)
+    checks = [checks_of("end-to-end", spread_of(numbers, one)) for one in turned]
     assert turn("end-to-end-fast", *checks)
 
 

@@ -13,23 +13,21 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.simulation.twins import simulate_twin
+from wildlab.studies import gating as gating
 from wildlab.studies.gating import (
-    READINGS,
-    claim_margins,
-    standard_error,
-    verdict,
-)
-from wildlab.studies.gating import monte_carlo as gating
-from wildlab.studies.gating.monte_carlo import (
     GATES,
     IMAGES,
+    READINGS,
     Outcome,
     Overflight,
+    claim_margins,
     draw_scene,
     gate,
     outcomes,
     overflight,
+    standard_error,
     streams,
+    verdict,
 )
 
 

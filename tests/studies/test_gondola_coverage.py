@@ -6,23 +6,22 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.studies.claims import said
+from tests.studies.claims import checks_of, said
 from wildlab.analysis.plans.coverage import as_planned
 from wildlab.evaluation.shares import HOLDS, decide_check
 from wildlab.simulation.parameters import load_twin
-from wildlab.studies.gondola_coverage.trial import (
+from wildlab.studies.gondola_coverage import (
     ADAPT,
     DOWN,
     ROLL,
     STRATEGIES,
     YAW,
     angles_of,
-    check_claims,
     near_cable,
     poses_of,
     ride,
 )
-from wildlab.studies.uav_coverage.trial import LOOKS, fences_of, land_of
+from wildlab.studies.uav_coverage import LOOKS, fences_of, land_of
 
 
 def made_up(count: int = 40, **changes: float) -> pd.DataFrame:
@@ -84,7 +83,7 @@ def test_what_the_adaptive_camera_does_and_sees_hardly_hangs_on_the_rate_of_imag
 
 
 def test_claims_are_those_published_and_turn_with_the_numbers():
-    assert all(map(all, said("gondola-coverage", check_claims(made_up())).values()))
+    assert all(map(all, said("gondola-coverage", checks_of("gondola-coverage", made_up())).values()))
     steepest, *_, flattest = YAW
     opposed = {
         "adaptive-least-outside": {"adaptive-75/outside": 7e4},
@@ -95,7 +94,8 @@ def test_claims_are_those_published_and_turn_with_the_numbers():
         "moving-more-less-redundant": {"roll-60/in_sight": 5.0},
     }
     for claim, change in opposed.items():
-        assert not any(said("gondola-coverage", check_claims(made_up(**change)))[claim]), claim
+        checks = checks_of("gondola-coverage", made_up(**change))
+        assert not any(said("gondola-coverage", checks)[claim]), claim
     # One pitch that is not best near the cable leaves the best of them.
-    check = check_claims(made_up(**{f"{steepest}/near": 0.4}))["yaw-best-near-the-track-at-some-pitch"]
-    assert decide_check(check).verdict == HOLDS
+    checks = checks_of("gondola-coverage", made_up(**{f"{steepest}/near": 0.4}))
+    assert decide_check(checks["yaw-best-near-the-track-at-some-pitch"]).verdict == HOLDS

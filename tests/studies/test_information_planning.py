@@ -6,11 +6,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.studies.claims import turn
+from tests.studies.claims import checks_of, turn
 from wildlab.analysis.search import rows_at
 from wildlab.evaluation.shares import FAILS, HOLDS, decide, decide_check
 from wildlab.planning.areas import contains
-from wildlab.studies.information_planning.trial import (
+from wildlab.studies.information_planning import (
     AHEAD,
     BUDGET_S,
     GREEDY,
@@ -19,7 +19,6 @@ from wildlab.studies.information_planning.trial import (
     SEARCHERS,
     STATIONS,
     SURVEY,
-    check_claims,
     draw_scene,
     draw_situation,
     numbers_of,
@@ -120,10 +119,12 @@ def test_a_greedy_choice_is_never_quicker_than_the_shortest_order():
 
 def test_claims_turn_with_the_numbers():
     good, bad = (
-        check_claims(table(**kind), loads=np.full(10, load)) for kind, load in ((GOOD, 0.6), (BAD, 0.01))
+        checks_of("information-planning", table(**kind), {"loads": np.full(10, load)})
+        for kind, load in ((GOOD, 0.6), (BAD, 0.01))
     )
     assert turn("information-planning", good, bad)
     for load, verdict in ((0.6, HOLDS), (1e-3, FAILS)):
-        check = check_claims(table(), loads=np.full(40, load))["computationally-expensive"]
+        checks = checks_of("information-planning", table(), {"loads": np.full(40, load)})
+        check = checks["computationally-expensive"]
         assert decide_check(check, 0.1).verdict == verdict
     assert decide(good["lower-search-time"].holds()).met == 40

@@ -4,15 +4,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.studies.claims import turn
+from tests.studies.claims import checks_of, turn
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.reporting.published import load_claims, load_published
-from wildlab.studies.large_ship import check_claims
-from wildlab.studies.large_ship.trial import (
+from wildlab.studies.large_ship import (
     DETECTOR,
     NEAR_M,
     START_S,
-    UNITS,
     WITH,
     WITHOUT,
     errors_of,
@@ -22,6 +20,7 @@ from wildlab.studies.large_ship.trial import (
     time_to_rest,
     track_both,
 )
+from wildlab.studies.rules import load_rules
 
 #: Means of H table 6.1, m, north and east, about an origin that is not printed: of receiver and detections.
 REFERENCE, POSITIONS = (6.6, 16.4), {WITH: (4.8, 12.2), WITHOUT: (3.6, 9.7)}
@@ -113,7 +112,7 @@ def test_moving_brings_centres_nearer(numbers):
 
 
 def test_every_number_is_recorded_and_every_published_one_computed(numbers):
-    assert {name for _, name in numbers} == set(UNITS)
+    assert all(load_rules("large-ship").unit_of(name) for _, name in numbers)
     printed = load_published("large-ship")
     assert {(subject, name) for name, subject in printed[["name", "subject"]].to_numpy()} <= set(numbers)
 
@@ -140,17 +139,17 @@ def test_claims_follow_the_numbers(numbers):
         (DETECTOR, "share_moved"): 1.0, (DETECTOR, "share_within_5_m"): 0.1,
         (DETECTOR, "detection_rate"): 0.5,
     }  # fmt: skip
-    checks = [check_claims(spread_of(numbers, one)) for one in (good, bad)]
+    checks = [checks_of("large-ship", spread_of(numbers, one)) for one in (good, bad)]
     assert turn("large-ship", *checks)
-    near = check_claims(
-        spread_of(numbers, good | {(WITH, "share_near_5"): 0.1, (WITHOUT, "share_near_5"): 0.2})
+    near = checks_of(
+        "large-ship", spread_of(numbers, good | {(WITH, "share_near_5"): 0.1, (WITHOUT, "share_near_5"): 0.2})
     )
     held_at = {limit: near["more-near-centre"].holds(float(limit)).all() for limit in NEAR_M[:2]}
     assert held_at == {5: False, 10: True}, "each limit has shares of its own"
     (stated,) = (one["threshold"] for one in load_claims("large-ship") if one["id"] == "more-near-centre")
     assert [stated / 2, stated, 2 * stated] == list(NEAR_M)
-    never = check_claims(
-        spread_of(numbers, {(WITH, "time_to_rest"): np.nan, (WITHOUT, "time_to_rest"): np.nan})
+    never = checks_of(
+        "large-ship", spread_of(numbers, {(WITH, "time_to_rest"): np.nan, (WITHOUT, "time_to_rest"): np.nan})
     )
     assert not never["rest-sooner"].premise.any(), "of a ship that never rests nothing is sooner"
     assert not never["mainly-navigation"].reaches(1.4), "what is left above all is no reduction"
@@ -159,4 +158,5 @@ def test_claims_follow_the_numbers(numbers):
 def test_what_scatters_is_that_of_the_worse_of_both(numbers):
     both = {(WITH, "sd_both"): 5.0, (WITHOUT, "sd_both"): 9.0}
     both |= {(WITH, "sd_true_poses"): 3.2, (WITHOUT, "sd_true_poses"): 8.3}
-    assert check_claims(spread_of(numbers, both))["mainly-navigation"].measured == pytest.approx(8.3 / 9)
+    checks = checks_of("large-ship", spread_of(numbers, both))
+    assert checks["mainly-navigation"].measured == pytest.approx(8.3 / 9)

@@ -4,13 +4,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.studies.claims import checks_of
 from wildlab.geometry.line_of_sight import field_of_view, in_field_of_view
 from wildlab.geometry.terrain import Terrain
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.landscape import grow_trees, synthetic_landscape
-from wildlab.studies import line_of_sight
-from wildlab.studies.line_of_sight import WAYS, furthest_ratio, timed
-from wildlab.studies.line_of_sight.trial import (
+from wildlab.studies.line_of_sight import (
     ANGLES,
     EXACT,
     HEIGHTS,
@@ -19,12 +18,16 @@ from wildlab.studies.line_of_sight.trial import (
     RAYS,
     TREES,
     VIEW,
+    WAYS,
     WHOLE_RAYS,
     camera_of,
     compare,
+    furthest_ratio,
     hidden_by_trees,
     look,
     nodes_of,
+    time_numbers,
+    timed,
     trial,
     width_on_ground,
 )
@@ -88,7 +91,7 @@ def test_trees_hide_what_stands_below_them_and_more_at_a_slant():
 
 
 def test_claims_follow_from_what_was_found(spread):
-    checks = line_of_sight.check_claims(spread, times_of())
+    checks = checks_of("line-of-sight", spread, time_numbers(times_of()))
     assert checks["letter-hides-everything"].holds().all()
     assert checks["trees-count-with-incidence"].holds().all()
     assert checks["shortening-pays-high-up"].holds().all()
@@ -101,7 +104,7 @@ def test_claims_follow_from_what_was_found(spread):
     for way in (RAYS, ANGLES):
         for height in HEIGHTS:
             turned[way, f"agreement_{height}m"] = 0.8
-    checks = line_of_sight.check_claims(turned, times_of())
+    checks = checks_of("line-of-sight", turned, time_numbers(times_of()))
     for claim in ("letter-hides-everything", "trees-count-with-incidence", "shortening-pays-high-up"):
         assert not checks[claim].holds().any(), claim
     assert not checks["view-grows-linearly"].holds(0.1).any()
@@ -111,9 +114,9 @@ def test_claims_follow_from_what_was_found(spread):
 @pytest.mark.parametrize(("rays", "alike"), [(1.4, True), (1.6, False), ((1.0, 0.2), False)])
 def test_times_are_alike_where_they_are_at_every_height(spread, rays, alike):
     times = times_of(rays=rays)
-    check = line_of_sight.check_claims(spread, times)["run-times-similar"]
+    check = checks_of("line-of-sight", spread, time_numbers(times))["run-times-similar"]
     assert check.holds(1.5).all() == alike
-    dear = line_of_sight.check_claims(spread, times_of(view=2.0))["occlusion-costs-more"]
+    dear = checks_of("line-of-sight", spread, time_numbers(times_of(view=2.0)))["occlusion-costs-more"]
     assert not dear.holds().any() and dear.unit == "µs"
 
 

@@ -6,11 +6,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.studies.claims import checks_of
 from wildlab.analysis.tracks.sighting import follow_positions, start
 from wildlab.errors import WildlabError
 from wildlab.reporting.published import load_claims
-from wildlab.studies.coloured_noise import trial as coloured_noise
-from wildlab.studies.linear_vs_nonlinear import trial as linear_vs_nonlinear
+from wildlab.studies import coloured_noise as coloured_noise
+from wildlab.studies import linear_vs_nonlinear as linear_vs_nonlinear
 from wildlab.tracking.motion import singer
 from wildlab.tracking.run import run_filter
 from wildlab.tracking.sensors import positions
@@ -62,21 +63,21 @@ THRESHOLDS = {
 
 @pytest.mark.parametrize("claim", OPPOSED)
 def test_claims_on_tracks_are_decided_flight_by_flight(claim):
-    checks = linear_vs_nonlinear.check_claims(flights({}, OPPOSED[claim]))
+    checks = checks_of("linear-vs-nonlinear", flights({}, OPPOSED[claim]))
     assert set(checks) == set(OPPOSED)
     assert checks[claim].holds(THRESHOLDS.get(claim)).tolist() == [True, False]
 
 
 def test_flights_without_what_a_claim_is_about_are_not_asked():
     white = {("measurements", "lag1_autocorrelation_east"): 0.1}
-    checks = linear_vs_nonlinear.check_claims(flights({}, white, {("ekf", "mae"): 150.0}))
+    checks = checks_of("linear-vs-nonlinear", flights({}, white, {("ekf", "mae"): 150.0}))
     for claim in ("too-optimistic", "innovations-coloured"):
         assert np.asarray(checks[claim].premise).tolist() == [True, False, True]
     assert checks["kf-more-accurate"].premise is None, "a lost target is what such a claim is about, too"
     alone = flights({}).drop(columns=[("beside", "lag1")])
-    assert np.asarray(
-        linear_vs_nonlinear.check_claims(alone)["slow-flight-more-correlated"].premise
-    ).tolist() == [False]
+    assert "slow-flight-more-correlated" not in checks_of("linear-vs-nonlinear", alone)
+    unknown = flights({("beside", "lag1"): np.nan})
+    assert not checks_of("linear-vs-nonlinear", unknown)["slow-flight-more-correlated"].premise.any()
 
 
 def noisy(*changes: dict[tuple[str, str], float]) -> pd.DataFrame:
@@ -118,7 +119,7 @@ NOISY_OPPOSED = {
 
 @pytest.mark.parametrize("claim", NOISY_OPPOSED)
 def test_claims_on_correlated_noise_are_decided_flight_by_flight(claim):
-    checks = coloured_noise.check_claims(noisy({}, NOISY_OPPOSED[claim]))
+    checks = checks_of("coloured-noise", noisy({}, NOISY_OPPOSED[claim]))
     assert set(checks) == set(NOISY_OPPOSED)
     assert checks[claim].holds(THRESHOLDS.get(claim)).tolist() == [True, False]
 

@@ -14,9 +14,7 @@ from wildlab.evaluation.shares import UNDECIDABLE, Check
 from wildlab.reporting.published import judge
 from wildlab.reporting.report import Report, open_report
 from wildlab.studies import monte_carlo
-from wildlab.studies.protocol import Study
 
-STUDY = Study("x", unit_of=lambda name: "m")
 #: Published there: mean error 9.4, mean north -4.1, of a sign that is not defined.
 PUBLISHED = "schmidt-fast-vessel"
 
@@ -28,7 +26,7 @@ def report() -> Report:
 
 def recorded(report: Report, **columns: Any) -> pd.DataFrame:
     spread = pd.DataFrame({("ekf", name): np.asarray(values, float) for name, values in columns.items()})
-    monte_carlo.record_spread(report, STUDY, spread, {})
+    monte_carlo.record_spread(report, lambda name: "m", spread, {})
     return spread
 
 
@@ -53,37 +51,37 @@ def test_what_is_recorded_is_what_is_judged(report):
     assert entries["mae", "ekf"]["below"] == pytest.approx(0.35, abs=0.01)
 
 
-def claims_of(monkeypatch: pytest.MonkeyPatch, *ids: str, **more: Any) -> None:
-    claims = [{"id": i, "text": f"Claim {i}.", "source": "H 1", **more} for i in ids]
-    monkeypatch.setattr(monte_carlo, "load_claims", lambda study: claims)
+def claims_of(*ids: str, **more: Any) -> list[dict[str, Any]]:
+    return [{"id": i, "text": f"Claim {i}.", "source": "H 1", **more} for i in ids]
 
 
-def test_claims_are_decided_by_the_interval_of_their_share(report, monkeypatch):
-    claims_of(monkeypatch, "always", "never", "half")
+def test_claims_are_decided_by_the_interval_of_their_share(report):
+    claims = claims_of("always", "never", "half")
     flights = np.arange(50)
-    checks = {"always": flights >= 0, "never": flights < 0, "half": flights < 30}
-    table = monte_carlo.decide_claims(report, "made-up", checks)
+    true = {"always": flights >= 0, "never": flights < 0, "half": flights < 30}
+    checks = {name: Check(true=one) for name, one in true.items()}
+    table = monte_carlo.decide_claims(report, claims, checks)
     assert table["verdict"].tolist() == ["holds", "does not hold", "undecided"]
     assert table["share"].tolist()[2] == "30 of 50 (46 to 72 %)"
     assert [c["fraction"] for c in report.claims] == [1.0, 0.0, 0.6]
     assert (report.claims[2]["low"], report.claims[2]["high"]) == share_interval(30, 50)[1:]
 
 
-def test_a_threshold_is_shown_at_half_and_at_twice(report, monkeypatch):
-    claims_of(monkeypatch, "a", threshold=2, reason="as far as one sees")
+def test_a_threshold_is_shown_at_half_and_at_twice(report):
+    claims = claims_of("a", threshold=2, reason="as far as one sees")
     measured = np.r_[np.full(50, 1.5), np.full(50, 3.0)]
-    (row,) = monte_carlo.decide_claims(report, "x", {"a": Check(measured=measured)}).to_dict("records")
+    (row,) = monte_carlo.decide_claims(report, claims, {"a": Check(measured=measured)}).to_dict("records")
     assert row["verdict"] == "undecided"
     assert row["threshold"] == "at 1 does not hold, at 4 holds; taken: 2 (as far as one sees)"
     assert (report.claims[0]["half"], report.claims[0]["twice"]) == ("does not hold", "holds")
 
 
-def test_a_threshold_that_the_measure_cannot_reach_is_left_out(report, monkeypatch):
-    claims_of(monkeypatch, "a", threshold=0.7)
+def test_a_threshold_that_the_measure_cannot_reach_is_left_out(report):
+    claims = claims_of("a", threshold=0.7)
     f1 = np.full(50, 0.9)
 
     def row(check: Check) -> str:
-        (one,) = monte_carlo.decide_claims(report, "x", {"a": check}).to_dict("records")
+        (one,) = monte_carlo.decide_claims(report, claims, {"a": check}).to_dict("records")
         return str(one["threshold"])
 
     assert row(Check(measured=f1, above=True)) == "at 0.35 holds, at 1.4 does not hold; taken: 0.7"
@@ -94,24 +92,24 @@ def test_a_threshold_that_the_measure_cannot_reach_is_left_out(report, monkeypat
     assert row(Check(measured=f1, reach=(0.6, 1))) == "0.7"
 
 
-def test_a_premise_and_a_difference_are_said(report, monkeypatch):
-    claims_of(monkeypatch, "a", premise="Errors grow in turns", own=True)
+def test_a_premise_and_a_difference_are_said(report):
+    claims = claims_of("a", premise="Errors grow in turns", own=True)
     met, true = np.arange(100) < 80, np.arange(100) < 40
     first, second = np.arange(100.0) % 7, np.zeros(100)
     check = Check(true=true, premise=met, first=first, second=second, unit="m")
-    (row,) = monte_carlo.decide_claims(report, "x", {"a": check}).to_dict("records")
+    (row,) = monte_carlo.decide_claims(report, claims, {"a": check}).to_dict("records")
     assert row["share"].startswith("40 of 80 (") and row["share"].endswith("of 100 flights in all")
     assert row["premise"] == "Errors grow in turns: 80 of 100 flights" and "Ours" in row["claim"]
     assert row["difference"].startswith(f"{first.mean():.2f} (") and row["difference"].endswith("m")
     check = Check(true=true, premise=~met)
-    (row,) = monte_carlo.decide_claims(report, "x", {"a": check}).to_dict("records")
+    (row,) = monte_carlo.decide_claims(report, claims, {"a": check}).to_dict("records")
     assert (row["verdict"], row["share"]) == ("premise not met", "20 of 100 flights meet the premise")
 
 
-def test_a_claim_without_a_check_is_named(report, monkeypatch):
-    claims_of(monkeypatch, "a")
+def test_a_claim_without_a_check_is_named(report):
+    claims = claims_of("a")
     with pytest.raises(WildlabError, match="claim 'a'"):
-        monte_carlo.decide_claims(report, "x", {})
+        monte_carlo.decide_claims(report, claims, {})
 
 
 def test_shares_of_flights_are_pooled_by_their_images():
@@ -123,8 +121,8 @@ def test_shares_of_flights_are_pooled_by_their_images():
     assert monte_carlo.pooled_share(spread * [0, 1], "x", "rate")[1] == 0
 
 
-def test_a_claim_that_needs_what_no_flight_has_cannot_be_decided(report, monkeypatch):
-    claims_of(monkeypatch, "a", needs="recorded paths")
-    (row,) = monte_carlo.decide_claims(report, "x", {}).to_dict("records")
+def test_a_claim_that_needs_what_no_flight_has_cannot_be_decided(report):
+    claims = claims_of("a", needs="recorded paths")
+    (row,) = monte_carlo.decide_claims(report, claims, {}).to_dict("records")
     assert (row["verdict"], row["share"]) == (UNDECIDABLE, "needs recorded paths")
     assert report.claims[0]["verdict"] == UNDECIDABLE

@@ -8,7 +8,7 @@ import pytest
 from wildlab.analysis.navigate import NavigationErrors
 from wildlab.analysis.navigation_inputs import Placement, Receiver
 from wildlab.navigation.receiver import Candidate, ReceiverNoise, Scale, SourceNoise
-from wildlab.studies.navigation import logged as noise
+from wildlab.studies import navigation as noise
 
 SCALE = Scale(np.array([2.0, 4.0]), np.array([0.2, 0.5]), 1.0, 300.0)
 COLOURED = ReceiverNoise(SourceNoise(0.1, 0.2, 3.0, 5.0, 50.0, 2.0), SourceNoise(0.5, 0.5))

@@ -4,24 +4,23 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.studies.claims import said
+from tests.studies.claims import checks_of, said
 from wildlab.errors import WildlabError
-from wildlab.studies.optical_flow_velocity import trial as study
-from wildlab.studies.optical_flow_velocity.trial import (
+from wildlab.studies import optical_flow_velocity as study
+from wildlab.studies.optical_flow_velocity import (
     IMAGES,
     LOGGED,
     READINGS,
-    RECORDED,
     STILL,
     SYNCHRONISED,
     TRUE,
-    check_claims,
     look,
     numbers_of,
     readings,
     stretches,
     velocity_numbers,
 )
+from wildlab.studies.rules import load_rules
 
 TWIN = "gimballed-ship"
 
@@ -72,7 +71,7 @@ def test_with_exact_poses_the_images_give_the_velocity_of_the_ship(looked, table
 
 def test_a_flight_gives_a_number_for_everything_that_is_recorded(looked, tables):
     numbers = numbers_of(looked, tables)
-    assert {name for _, name in numbers} == set(RECORDED)
+    assert all(load_rules("optical-flow-velocity").unit_of(name) for _, name in numbers)
     assert numbers[IMAGES, "in_view_share"] > numbers[IMAGES, "whole_share"] > 0
     assert numbers[LOGGED, "pairs"] == len(looked.pairs)
     shares = looked.shares
@@ -131,7 +130,7 @@ def spread_of(count=40, **changes):
 )
 def test_each_claim_turns_with_its_numbers(claim, changes):
     checks = (
-        said("optical-flow-velocity", check_claims(spread_of())),
-        said("optical-flow-velocity", check_claims(spread_of(**changes))),
+        said("optical-flow-velocity", checks_of("optical-flow-velocity", spread_of())),
+        said("optical-flow-velocity", checks_of("optical-flow-velocity", spread_of(**changes))),
     )
     assert all(checks[0][claim]) and not any(checks[1][claim])

@@ -6,14 +6,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.studies.claims import turn
+from tests.studies.claims import checks_of, turn
 from wildlab.detection.colour import Colour
 from wildlab.evaluation.shares import decide
 from wildlab.geometry.camera import Camera
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.scene.coloured import Ground
 from wildlab.simulation.scene.flights import SceneFlight
-from wildlab.studies.precision_drop.trial import (
+from wildlab.studies.precision_drop import (
     COUNTS,
     FOUND,
     HORIZON,
@@ -21,7 +21,6 @@ from wildlab.studies.precision_drop.trial import (
     SINGLE,
     Drop,
     alarms,
-    check_claims,
     error_of_mean,
     flown,
     horizon_views,
@@ -104,12 +103,12 @@ def table(**changed):
 
 
 def test_claims_turn_with_the_numbers():
-    good, bad = check_claims(table()), check_claims(
+    good, bad = checks_of("precision-drop", table()), checks_of("precision-drop",
         table(
             tarpaulin_false_alarms_per_image=0.1, tarpaulin_off_centre=2, tarpaulin_few_pixels=2,
             mean_error=5, horizon_alarms_with_borders=0.4,
         )
     )  # fmt: skip
     assert turn("precision-drop", good, bad)
-    none = check_claims(table(horizon_alarms_without_borders=0))["horizon-near-the-border"]
+    none = checks_of("precision-drop", table(horizon_alarms_without_borders=0))["horizon-near-the-border"]
     assert decide(none.holds(0.1), none.premise).met == 0

@@ -8,23 +8,25 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.studies.claims import checks_of
 from wildlab.evaluation.shares import Check
 from wildlab.flight.store import Flight
 from wildlab.replay.scene import Points
 from wildlab.simulation.twins import simulate_twin
-from wildlab.studies.replay import EVERY_S, WALK, track_targets
-from wildlab.studies.replay.trial import (
+from wildlab.studies.replay import (
     CLOCK,
+    EVERY_S,
     NONE,
     OFF_S,
     ONE,
     SINGLE,
     STEP_S,
+    WALK,
     Moments,
-    check_claims,
     clock_errors,
     moments_of,
     off_of,
+    track_targets,
 )
 
 
@@ -100,7 +102,7 @@ def spread_of(gain: float, kinds: dict[str, float]) -> pd.DataFrame:
 
 def test_claims_follow_the_numbers():
     all_there = {ONE: 0.1, SINGLE: 0.2, NONE: 0.7}
-    checks = check_claims(spread_of(0.5, all_there | {NONE: 0.0}))
+    checks = checks_of("replay", spread_of(0.5, all_there | {NONE: 0.0}))
     truths = {id: bool(np.all(check.true)) for id, check in checks.items() if isinstance(check, Check)}
     assert truths == {
         "one-of-several-in-view": True,
@@ -108,4 +110,4 @@ def test_claims_follow_the_numbers():
         "none-in-view-several-tracks": False,
         "manual-sync-increases-precision": True,
     }
-    assert not np.any(check_claims(spread_of(-0.5, all_there))["manual-sync-increases-precision"].true)
+    assert not np.any(checks_of("replay", spread_of(-0.5, all_there))["manual-sync-increases-precision"].true)

@@ -11,7 +11,7 @@ from wildlab.errors import WildlabError
 from wildlab.evaluation.pose_noise import KINDS, PoseNoise
 from wildlab.flight.store import Flight
 from wildlab.simulation.twins import simulate_twin
-from wildlab.studies.schmidt.trial import (
+from wildlab.studies.schmidt import (
     BOUNDS,
     CONSTANT,
     COVARIANCES,

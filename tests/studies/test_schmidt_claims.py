@@ -6,10 +6,21 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.studies.claims import checks_of
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.reporting.published import load_claims, load_published
-from wildlab.studies.schmidt import band, check_claims, covariances_table, curve_table, predicted_error
-from wildlab.studies.schmidt.trial import FACTORS, FILTERS, MORE_NAMES, NAMES, NEES_NAMES, PUBLISHED, SUBJECTS
+from wildlab.studies.schmidt import (
+    FACTORS,
+    FILTERS,
+    MORE_NAMES,
+    NAMES,
+    NEES_NAMES,
+    PUBLISHED,
+    SUBJECTS,
+    covariances_table,
+    curve_table,
+    predicted_error,
+)
 
 STUDIES = ("schmidt-fast-vessel", "schmidt-slow-vessel-eight", "schmidt-drifting-vessel-eight")
 #: What the claims of all three studies need for their vague words; the strictest where they differ.
@@ -59,7 +70,7 @@ def flight_with(**changed: float) -> dict[tuple[str, str], float]:
 
 
 def false_with(**changed: float) -> set[str]:
-    checks = check_claims(pd.DataFrame([flight_with(**changed)]))
+    checks = checks_of("schmidt", pd.DataFrame([flight_with(**changed)]))
     return {claim for claim, check in checks.items() if not check.holds(THRESHOLDS.get(claim))[0]}
 
 
@@ -133,7 +144,8 @@ def test_each_claim_is_lost_by_what_it_speaks_of_alone(changed, lost):
     ],
 )
 def test_each_premise_is_lost_by_what_it_speaks_of(changed, of):
-    with_it, without = (check_claims(pd.DataFrame([flight_with(**one)]))[of].premise for one in ({}, changed))
+    flights = (pd.DataFrame([flight_with(**one)]) for one in ({}, changed))
+    with_it, without = (checks_of("schmidt", one)[of].premise for one in flights)
     assert with_it is not None and with_it[0]
     assert without is not None and not without[0]
 
@@ -146,14 +158,14 @@ def test_premises_do_not_depend_on_what_the_filters_gave(times):
         key: value * (times if key[0] not in ("flight", "mekf") or "rms_" in key[1] else 1)
         for key, value in first.items()
     }
-    before, after = (check_claims(pd.DataFrame([one])) for one in (first, other))
+    before, after = (checks_of("schmidt", pd.DataFrame([one])) for one in (first, other))
     for name, check in before.items():
         assert np.array_equal(check.premise, after[name].premise), name  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("study", STUDIES)
 def test_every_claim_is_decided_and_every_number_has_its_subject(study):
-    checks = check_claims(pd.DataFrame([flight_with()]))
+    checks = checks_of("schmidt", pd.DataFrame([flight_with()]))
     claims = load_claims(study)
     assert len(claims) > 15 and len({claim["id"] for claim in claims}) == len(claims)
     for claim in claims:
@@ -171,10 +183,9 @@ def test_an_average_is_held_against_the_band_of_what_it_is_worth():
     rows = [
         flight_with(schmidt__nees=value, schmidt__nees_worth=20.0) for value in (low, high, 0.9 * low, 5.0)
     ]
-    found = band(pd.DataFrame(rows), "schmidt")
-    assert found.inside.tolist() == [True, True, False, False]
-    assert found.below.tolist() == [False, False, True, False]
-    assert found.above.tolist() == [False, False, False, True]
+    checks = checks_of("schmidt", pd.DataFrame(rows))
+    assert checks["schmidt-nees-inside"].holds().tolist() == [True, True, False, False]
+    assert checks["schmidt-pessimistic"].holds().tolist() == [False, False, True, False]
 
 
 def flights(nees: float = 2.0, size: int = 60) -> pd.DataFrame:

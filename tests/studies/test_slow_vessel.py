@@ -4,13 +4,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.studies.claims import said
+from tests.studies.claims import checks_of, said
 from wildlab.simulation.twins import simulate_twin
-from wildlab.studies.slow_vessel import trial as slow_vessel
-from wildlab.studies.slow_vessel.trial import (
+from wildlab.studies import slow_vessel as slow_vessel
+from wildlab.studies.slow_vessel import (
     SD_MEASUREMENT,
     SUBJECTS,
-    check_claims,
     evaluate_sources,
     first_case,
     navigate_vessel,
@@ -91,15 +90,15 @@ OPPOSED = {
 
 @pytest.mark.parametrize("claim", OPPOSED)
 def test_claims_are_decided_flight_by_flight(claim):
-    checks = check_claims(pd.DataFrame([GOOD, {**GOOD, **OPPOSED[claim]}]))
+    checks = checks_of("slow-vessel", pd.DataFrame([GOOD, {**GOOD, **OPPOSED[claim]}]))
     assert set(checks) == set(OPPOSED)
     assert said("slow-vessel", checks)[claim] == [True, False]
 
 
 def test_flights_without_what_a_claim_is_about_are_not_asked():
     calm = {("vessel", "speed_beginning"): 0.4}
-    checks = check_claims(
-        pd.DataFrame([GOOD, {**GOOD, **calm}, {**GOOD, **OPPOSED["larger-than-first-case"]}])
+    checks = checks_of(
+        "slow-vessel", pd.DataFrame([GOOD, {**GOOD, **calm}, {**GOOD, **OPPOSED["larger-than-first-case"]}])
     )
     assert list(checks["beginning-larger-on-whole-flight"].premise) == [True, False, True]
     assert list(checks["reference-explains"].premise) == [True, True, False]

@@ -4,16 +4,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.studies.claims import said
+from tests.studies.claims import checks_of, said
 from wildlab.errors import WildlabError
 from wildlab.flight.clocks import poses_at
 from wildlab.geometry.frames import matrix_to_euler
 from wildlab.simulation.twins import simulate_twin
-from wildlab.studies.static_point.trial import (
+from wildlab.studies.static_point import (
     COLUMNS,
     OBSERVER,
     UNCALIBRATED,
-    check_claims,
     evaluate_columns,
     filter_errors,
     navigate_observers,
@@ -102,6 +101,6 @@ OPPOSED = {
 
 @pytest.mark.parametrize("claim", OPPOSED)
 def test_claims_are_decided_flight_by_flight(claim):
-    checks = check_claims(pd.DataFrame([GOOD, {**GOOD, **OPPOSED[claim]}]), bound=0.1)
+    checks = checks_of("static-point", pd.DataFrame([GOOD, {**GOOD, **OPPOSED[claim]}]), {"bound": 0.1})
     assert set(checks) == set(OPPOSED)
     assert said("static-point", checks)[claim] == [True, False]

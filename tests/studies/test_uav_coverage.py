@@ -6,12 +6,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.studies.claims import said
+from tests.studies.claims import checks_of, said
 from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import FAILS, NO_PREMISE, decide_check
 from wildlab.planning.coverage import nodes_in
 from wildlab.simulation.parameters import load_twin
-from wildlab.studies.uav_coverage.trial import (
+from wildlab.studies.uav_coverage import (
     CASES,
     DOWN,
     LOW,
@@ -21,7 +21,6 @@ from wildlab.studies.uav_coverage.trial import (
     SPACINGS,
     YAW,
     Case,
-    check_claims,
     fences_of,
     land_of,
     plan,
@@ -73,7 +72,7 @@ def test_the_platform_keeps_its_height_above_ground():
 
 
 def test_claims_are_those_published_and_turn_with_the_numbers():
-    assert all(map(all, said("uav-coverage", check_claims(made_up())).values()))
+    assert all(map(all, said("uav-coverage", checks_of("uav-coverage", made_up())).values()))
     opposed = {
         "yaw-covers-more": {f"{YAW}/ground": 1.05e5},
         "yaw-covers-more-inside": {f"{YAW}/seen": 0.905},
@@ -87,14 +86,14 @@ def test_claims_are_those_published_and_turn_with_the_numbers():
         "too-wide-not-whole": {f"rows-{SPACINGS[-1]:.0f}m/unseen": 0.005},
     }
     for claim, change in opposed.items():
-        assert not any(said("uav-coverage", check_claims(made_up(**change)))[claim]), claim
+        assert not any(said("uav-coverage", checks_of("uav-coverage", made_up(**change)))[claim]), claim
     # Where rows leave nothing unseen, yaw has nothing to add within the enclosures.
-    check = check_claims(made_up(**{f"{DOWN}/seen": 0.999}))["yaw-covers-more-inside"]
+    check = checks_of("uav-coverage", made_up(**{f"{DOWN}/seen": 0.999}))["yaw-covers-more-inside"]
     assert decide_check(check, 0.1).verdict == NO_PREMISE
 
 
 def test_closer_rows_that_do_not_help_are_no_proof():
-    check = check_claims(made_up(**{f"{LOW_CLOSE}/seen": 0.82}))["lower-needs-closer"]
+    check = checks_of("uav-coverage", made_up(**{f"{LOW_CLOSE}/seen": 0.82}))["lower-needs-closer"]
     assert decide_check(check, 0.02).verdict == FAILS
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.studies.claims import checks_of
 from wildlab.analysis.rendered import judge
 from wildlab.detection.floating import FloatingObjects, FloatingThresholds, find_objects
 from wildlab.evaluation.intervals import share_interval
@@ -12,15 +13,14 @@ from wildlab.geometry.camera import Camera
 from wildlab.geometry.mount import R_MC_DOWN
 from wildlab.reporting.published import load_claims, load_published
 from wildlab.simulation.scene import EVEN, IDEAL, Scene, expose, rectangle, render, sensor_of
-from wildlab.studies.vessel_detection import STUDY
-from wildlab.studies.vessel_detection.trial import (
+from wildlab.studies.rules import load_rules
+from wildlab.studies.vessel_detection import (
     BOATS,
     CUT,
     SEA,
     SHIP,
     WHOLE,
     Image,
-    check_claims,
     numbers_of,
     tally,
     trial,
@@ -106,7 +106,7 @@ CLAIMS = {claim["id"]: claim for claim in load_claims("vessel-detection")}
 
 def decided(**changes):
     """The verdict on each claim that is judged by images, by its own threshold."""
-    checks = check_claims(spread_of(**changes))
+    checks = checks_of("vessel-detection", spread_of(**changes))
     assert set(checks) == set(CLAIMS)
     return {
         name: decide_check(check, float(CLAIMS[name]["threshold"])).verdict
@@ -128,9 +128,9 @@ def test_claims_are_judged_by_all_images_together():
 
 
 def test_what_is_missed_is_a_small_part_or_not():
-    assert not check_claims(spread_of())["only-small-parts-missed"].premise.any()
+    assert not checks_of("vessel-detection", spread_of())["only-small-parts-missed"].premise.any()
     for share, small in ((0.02, True), (0.8, False)):
-        check = check_claims(spread_of(ship__missed=1.0, ship__largest_share_missed=share))
+        check = checks_of("vessel-detection", spread_of(ship__missed=1.0, ship__largest_share_missed=share))
         assert check["only-small-parts-missed"].premise.all()
         assert (check["only-small-parts-missed"].holds(0.1) == small).all()
 
@@ -151,13 +151,13 @@ def test_a_trial_has_what_is_published_and_the_same_twice():
     assert one[SHIP, "images"] == 3
     for row in load_published("vessel-detection").itertuples():
         assert np.isfinite(one[row.subject, row.name])
-        assert STUDY.unit_of(row.name) is not None
+        assert load_rules("vessel-detection").unit_of(row.name) is not None
     assert 0 <= one[SHIP, "detection_rate"] <= 1
 
 
 def test_one_in_a_hundred_is_not_none_however_many_flights_have_none():
     spread = pd.concat([spread_of()[:36], spread_of(ship__images_with_false=1.0)[:4]], ignore_index=True)
-    check = check_claims(spread)["ship-without-false-alarm"]
+    check = checks_of("vessel-detection", spread)["ship-without-false-alarm"]
     assert check.pooled == (4, 400) and (check.measured == 0).mean() == 0.9
     assert decide_check(check, 0.00864).verdict == UNDECIDED
     assert decide_check(check, 0.001).verdict == FAILS

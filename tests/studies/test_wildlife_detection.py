@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from tests.studies.animal_pictures import CAMERA
-from tests.studies.claims import said
+from tests.studies.claims import checks_of, said
 from wildlab.detection.warm import Warm
 from wildlab.reporting.published import load_claims
 from wildlab.simulation.scene import (
@@ -13,8 +13,7 @@ from wildlab.simulation.scene import (
     sensor_of,
 )
 from wildlab.studies import wildlife_detection
-from wildlab.studies.wildlife_detection import trial
-from wildlab.studies.wildlife_detection.trial import (
+from wildlab.studies.wildlife_detection import (
     CLOUDY,
     CONSTANT,
     COUNTS,
@@ -37,13 +36,13 @@ def numbers():
     response = CameraResponse()
     sensor = sensor_of(response, (120, 180), np.random.default_rng(1))
     operator = Operator(CAMERA, response, sensor, np.random.default_rng(2))
-    return trial.numbers_of(operator, trial.take_pictures(operator, 4))
+    return wildlife_detection.numbers_of(operator, wildlife_detection.take_pictures(operator, 4))
 
 
 def test_a_seed_has_all_numbers(numbers):
     spread = pd.DataFrame([numbers] * 3)
     decided = {claim["id"] for claim in load_claims("wildlife-detection") if "needs" not in claim}
-    assert decided == set(wildlife_detection.check_claims(spread))
+    assert decided == set(checks_of("wildlife-detection", spread))
     for subject in (*METHODS, *PROPOSED):
         at = wildlife_detection.places([CLOUDY])
         assert wildlife_detection.counts_of(spread, subject, at).shape == (9, 3)
@@ -84,7 +83,7 @@ def spread_of(numbers, **changes):
 def test_claims_turn(numbers):
 
     def true(spread):
-        found = said("wildlife-detection", wildlife_detection.check_claims(spread))
+        found = said("wildlife-detection", checks_of("wildlife-detection", spread))
         return {key: all(flights) for key, flights in found.items()}
 
     good = true(spread_of(numbers))
@@ -115,7 +114,7 @@ def test_claims_turn(numbers):
 
 
 def check_of(claim, spread):
-    return np.array(said("wildlife-detection", wildlife_detection.check_claims(spread))[claim])
+    return np.array(said("wildlife-detection", checks_of("wildlife-detection", spread))[claim])
 
 
 @pytest.mark.parametrize(("claim", "subject"), [("too-hot", "not_hot"), ("size-from-ground", "sized")])
@@ -137,8 +136,6 @@ def test_the_threshold_is_higher_than_needed_where_that_without_the_herd_finds_m
 
 
 def test_a_fall_is_a_part_of_what_was(numbers):
-    assert wildlife_detection.fall([1.0, 0.2], [0.8, 0.0]).tolist() == pytest.approx([0.2, 1.0])
-    assert np.isnan(wildlife_detection.fall([0.0], [0.0])).all()
     # From 0.2 to zero is by all of it, and by no more than the threshold of 0.2.
     low = {"adaptive_offset__found": 1.0, "adaptive_offset__missed": 8.0}
     gone = spread_of(numbers, **low, adaptive_offset__found_after=0.0)
@@ -148,9 +145,9 @@ def test_a_fall_is_a_part_of_what_was(numbers):
 
 def test_a_premise_that_is_not_met_decides_nothing(numbers):
     still = spread_of(numbers, ground__level_after=62.0)
-    assert not wildlife_detection.check_claims(still)["constant-fails"].premise.any()
+    assert not checks_of("wildlife-detection", still)["constant-fails"].premise.any()
     none = spread_of(numbers, adaptive_51__pieces=np.nan)
-    assert not wildlife_detection.check_claims(none)["small-block-splits"].premise.any()
+    assert not checks_of("wildlife-detection", none)["small-block-splits"].premise.any()
 
 
 def test_printed_settings_are_the_theses():
@@ -162,4 +159,6 @@ def test_printed_settings_are_the_theses():
     assert (METHODS[ENHANCED].background, METHODS[ENHANCED].block_px, METHODS[ENHANCED].level) == (
         "enhance", 251, 160,
     )  # fmt: skip
-    assert all(isinstance(one, Warm) and one.smallest_px == trial.SMALLEST for one in METHODS.values())
+    assert all(
+        isinstance(one, Warm) and one.smallest_px == wildlife_detection.SMALLEST for one in METHODS.values()
+    )

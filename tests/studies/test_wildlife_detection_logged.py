@@ -15,7 +15,7 @@ from wildlab.detection.warm import Warm, find_warm
 from wildlab.evaluation.matching import Rates, match, rates
 from wildlab.flight.readers.frames import open_frames
 from wildlab.flight.readers.labels import read_labels
-from wildlab.studies.wildlife_detection.trial import CONSTANT, ENHANCED, METHODS, SUBTRACTED
+from wildlab.studies.wildlife_detection import CONSTANT, ENHANCED, METHODS, SUBTRACTED
 
 pytestmark = pytest.mark.slow
 

@@ -11,8 +11,8 @@ from wildlab.simulation.scene import (
     slab,
     tree,
 )
-from wildlab.studies.wildlife_detection import trial
-from wildlab.studies.wildlife_detection.trial import (
+from wildlab.studies import wildlife_detection
+from wildlab.studies.wildlife_detection import (
     CONSTANT,
     METHODS,
     SUBTRACTED,
@@ -38,7 +38,7 @@ def test_a_warm_slab_is_a_false_alarm_and_a_missed_animal_is_missed():
 def test_an_animal_under_a_tree_counts_neither_way():
     under = replace(tree(3.6, DARK), texture_seed=4).at(0.9, 0.0)
     picture = picture_of(rhino(), under)
-    assert picture.view.visible(1) < trial.SHOWN
+    assert picture.view.visible(1) < wildlife_detection.SHOWN
     assert picture.animals == {}
     judged = judge(picture, find(picture, replace(METHODS[CONSTANT], smallest_px=3.0)))
     assert judged.counts.tolist() == [0, 0, 0]
@@ -60,14 +60,14 @@ def test_a_detection_much_larger_than_the_animal_is_not_of_it():
 
 def test_what_is_proposed_follows_from_the_ground():
     picture = picture_of(rhino())
-    sized = trial.proposed(trial.BY_SIZE, picture, CAMERA, IDEAL)
+    sized = wildlife_detection.proposed(wildlife_detection.BY_SIZE, picture, CAMERA, IDEAL)
     assert sized.smallest_px == pytest.approx(0.2 * (320 / 30) ** 2)
     near = replace(picture, distance=15.0)
     assert (
-        trial.proposed(trial.BY_BLOCK, near, CAMERA, IDEAL).block_px
-        > trial.proposed(trial.BY_BLOCK, picture, CAMERA, IDEAL).block_px
+        wildlife_detection.proposed(wildlife_detection.BY_BLOCK, near, CAMERA, IDEAL).block_px
+        > wildlife_detection.proposed(wildlife_detection.BY_BLOCK, picture, CAMERA, IDEAL).block_px
     )
-    cold = trial.proposed(trial.NOT_HOT, picture, CAMERA, IDEAL)
+    cold = wildlife_detection.proposed(wildlife_detection.NOT_HOT, picture, CAMERA, IDEAL)
     oven = picture_of(rhino(0, -4), slab(2.0, 2.0, 60.0).at(0.0, 4.0))
     assert judge(oven, find(oven, METHODS[SUBTRACTED])).counts.tolist() == [1, 1, 0]
     assert judge(oven, find(oven, cold)).counts.tolist() == [1, 0, 0]

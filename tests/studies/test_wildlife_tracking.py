@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.studies.claims import checks_of
 from wildlab.analysis.animals.tracking import (
     Found,
     Known,
@@ -19,8 +20,7 @@ from wildlab.analysis.animals.tracking import (
 from wildlab.evaluation.intervals import share_interval
 from wildlab.evaluation.shares import FAILS, HOLDS, decide_check
 from wildlab.planning.planner import SEARCH
-from wildlab.studies.wildlife_tracking import check_claims
-from wildlab.studies.wildlife_tracking.trial import (
+from wildlab.studies.wildlife_tracking import (
     FILTERS,
     GONDOLA,
     KALMAN,
@@ -72,7 +72,7 @@ def spread_of(**changed: float) -> pd.DataFrame:
 
 
 def verdict(claim: str, threshold: float | None = None, **changed: float) -> str:
-    return decide_check(check_claims(spread_of(**changed), np.full(N, 9.0))[claim], threshold).verdict
+    return decide_check(checks_of("wildlife-tracking", spread_of(**changed))[claim], threshold).verdict
 
 
 @pytest.mark.parametrize(
@@ -100,18 +100,18 @@ def test_each_claim_turns_with_its_number(claim, threshold, changed):
     assert verdict(claim, threshold, **changed) == FAILS
 
 
-def test_the_cost_decides_its_claim():
-    spread = spread_of()
-    assert decide_check(check_claims(spread, np.full(N, 9.0))["dearer-than-ekf"], 1.0).verdict == HOLDS
-    assert decide_check(check_claims(spread, np.full(N, 0.5))["dearer-than-ekf"], 1.0).verdict == FAILS
-    assert "dearer-than-ekf" not in check_claims(spread)
+@pytest.mark.parametrize(("cost", "verdict"), [(9.0, HOLDS), (0.5, FAILS)])
+def test_the_cost_decides_its_claim(cost, verdict):
+    checks = checks_of("wildlife-tracking", spread_of(), {"cost": np.full(N, cost)})
+    assert decide_check(checks["dearer-than-ekf"], 1.0).verdict == verdict
+    assert "dearer-than-ekf" not in checks_of("wildlife-tracking", spread_of())
 
 
 def test_worlds_without_a_number_count_neither_way():
     spread = spread_of()
     spread.loc[: N // 4, (f"{UAV}-{NEGATIVE}", "sd")] = np.nan
     spread.loc[: N // 4, (REVISITS, "fall")] = np.nan
-    checks = check_claims(spread)
+    checks = checks_of("wildlife-tracking", spread)
     for claim, threshold in (("negative-lowers-uncertainty-uav", None), ("falls-on-revisit", 0.5)):
         decision = decide_check(checks[claim], threshold)
         assert decision.verdict == HOLDS and decision.met == N - N // 4 - 1
@@ -120,7 +120,7 @@ def test_worlds_without_a_number_count_neither_way():
 @pytest.mark.parametrize(("wrong", "of", "holds"), [(5, 15, True), (1, 10, False), (2, 100, False)])
 def test_animals_seen_again_are_counted_of_all_worlds_together(wrong, of, holds):
     one = {f"{UAV}-{NEGATIVE}__later": of / N, f"{UAV}-{NEGATIVE}__right": (of - wrong) / N}
-    checks = check_claims(spread_of(**one))
+    checks = checks_of("wildlife-tracking", spread_of(**one))
     share = share_interval(wrong, of)
     decided = decide_check(checks["same-problem-uav"], 0.1).verdict
     assert (decided == HOLDS) == (share.low > 0.1) == holds

@@ -6,7 +6,7 @@
     compared = schmidt.compare_flight(study.data, study.seed)     # one flight
     runs = study.runs(schmidt.summarise(compared))                # the same of every seed
     study.record(runs)
-    study.show(figures=[...], checks=schmidt.check_claims(runs))
+    study.show(figures=[...], checks=study.checks(runs))
 """
 
 from __future__ import annotations
@@ -168,12 +168,16 @@ class OpenStudy:
 
     def record(self, runs: pd.DataFrame, n: Mapping[str, int] | None = None) -> None:
         """Record what all flights give, by the case's metrics; ``n``: how many observations a subject has."""
-        record_spread(self.report, self.case, runs, dict(n or {}))
+        record_spread(self.report, self.case.rules.unit_of, runs, dict(n or {}))
+
+    def checks(self, runs: pd.DataFrame, more: Mapping[str, ArrayLike] | None = None) -> dict[str, Check]:
+        """What the flights give for each claim, by the case's rules; see `Study.checks`."""
+        return self.case.checks(runs, more)
 
     def show(
         self,
         figures: Sequence[Shown],
-        checks: Mapping[str, Check | ArrayLike] | None = None,
+        checks: Mapping[str, Check] | None = None,
         tables: Mapping[str, pd.DataFrame] | None = None,
         values: Mapping[str, Any] | None = None,
         twins: Sequence[str] = (),
@@ -190,13 +194,11 @@ class OpenStudy:
         count = self.seeds or 1
         words = f"{count} simulated flights" if count > 1 else "one simulated flight"
         given = {"flights": words, "seed": self.seed, **(values or {})}
-        if self.case.answer is None:
-            raise WildlabError(f"the case {self.case.case!r} gives no answer", "give its Study one")
         show_page(
             self.report,
             self.texts,
             title=self.entry.title,
-            answer=self.case.answer,
+            answer=self.case.rules.answers,
             figures=figures,
             checks=checks,
             tables=tables,

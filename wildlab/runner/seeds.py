@@ -31,7 +31,7 @@ from typing import Any, NamedTuple
 from wildlab.errors import WildlabError
 from wildlab.files import digest, write_atomic
 from wildlab.paths import DATA, PACKAGE
-from wildlab.studies.protocol import Values, find_case
+from wildlab.studies.protocol import Values, case_names, find_case
 
 #: A change in any of these rooms can change a number.
 ROOMS = (
@@ -45,8 +45,6 @@ ROOMS = (
     "evaluation",
     "analysis",
 )
-#: Of the studies their trials can; how they are shown and said cannot.
-TRIALS = "studies/*/trial.py"
 #: Packages below them whose version can.
 PACKAGES = (
     "filterpy",
@@ -80,7 +78,9 @@ def page_key(notebook: Path, given: Mapping[str, Any], code: str) -> str:
     published, the notebook, and ``given``, whatever the notebook is given."""
     rooms = ("studies", "reporting", "messages")
     shown = [path for room in rooms for path in (PACKAGE / room).rglob("*.py")]
-    texts = [*(DATA / "published").glob("*.toml"), *(DATA / "messages").rglob("*.toml")]
+    texts = [
+        path for folder in ("published", "studies", "messages") for path in (DATA / folder).rglob("*.toml")
+    ]
     shown += [DATA / "glossary.toml", *texts, *(DATA / "pages").glob("*")]
     return digest([code, dict(given)], [(path.name, path) for path in [*sorted(shown), notebook]])
 
@@ -88,7 +88,10 @@ def page_key(notebook: Path, given: Mapping[str, Any], code: str) -> str:
 def code_key() -> str:
     """The code of all trials and below them, the twins' parameters and the packages' versions, as 64
     hexadecimal digits."""
-    code = [path for room in ROOMS for path in (PACKAGE / room).rglob("*.py")] + [*PACKAGE.glob(TRIALS)]
+    code = [path for room in ROOMS for path in (PACKAGE / room).rglob("*.py")]
+    # Of the studies the cases can; rules, pages and words cannot.
+    cases = (PACKAGE / "studies" / f"{name.replace('-', '_')}.py" for name in case_names())
+    code += [path for path in cases if path.is_file()]
     # Twins share parts, so a change of any of their files may be a change of each. Named as in a checkout, so
     # that a wheel of the same code has the same key.
     named = [(f"wildlab/{path.relative_to(PACKAGE).as_posix()}", path) for path in code]

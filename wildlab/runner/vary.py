@@ -11,7 +11,7 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -19,7 +19,7 @@ import pandas as pd
 from wildlab.errors import RunFailed, WildlabError
 from wildlab.files import write_json
 from wildlab.paths import NOTEBOOKS, REPORTS
-from wildlab.reporting.published import judge, published_rows
+from wildlab.reporting.published import judge, load_claims, published_rows
 from wildlab.reporting.report import open_report
 from wildlab.reporting.text import slug
 from wildlab.runner.catalogue import StudyEntry, find_study, load_studies
@@ -60,7 +60,6 @@ def vary_study(
     *,
     factors: Sequence[float] = FACTORS,
     seeds: int = SEEDS,
-    told: dict[str, Any] | None = None,
     reports: Path = REPORTS,
     notebooks: Path = NOTEBOOKS,
     parallel: int = 1,
@@ -78,8 +77,6 @@ def vary_study(
         By which the parameters are multiplied.
     seeds
         Over how many flights, the same for all.
-    told
-        What the study's claims are told besides the flights.
     parallel
         How many processes.
     tell
@@ -118,7 +115,7 @@ def vary_study(
         reason = failures.get(work.study, "")
         if reason and group == AS_IT_IS:
             raise RunFailed(reason, "mend that first")
-        verdicts = {} if reason else _verdicts(study, case, work, told or {})
+        verdicts = {} if reason else _verdicts(study, case, work)
         moved.append(Moved(group, factor, verdicts, reason))
     table = turned_table(moved)
     rows = [
@@ -227,18 +224,18 @@ def _compute(works: Sequence[SeedWork], parallel: int, tell: Callable[[str], Non
     return failures
 
 
-def _verdicts(study: StudyEntry, case: Study, work: SeedWork, told: dict[str, Any]) -> dict[str, str]:
+def _verdicts(study: StudyEntry, case: Study, work: SeedWork) -> dict[str, str]:
     """The verdicts on a study's claims and published numbers, by what they are on."""
     rows = [values for seed in work.seeds if (values := read_seed(work, seed)) is not None]
     if len(rows) < len(work.seeds):
         raise RunFailed(f"numbers of {work.study} have gone while they were read", "run it again")
     spread = pd.DataFrame([split_keys(values) for values in rows])
     report = open_report(study=study.name, kind="twin", seeds=len(rows))
-    record_spread(report, case, spread, {})
-    found: dict[str, str] = {}
-    if case.check_claims is not None:
-        decide_claims(report, study.name, case.check_claims(spread, **told))
-        found = {claim["id"]: claim["verdict"] for claim in report.claims}
+    record_spread(report, case.rules.unit_of, spread, {})
+    # What a claim asks besides the flights, a notebook measures.
+    checks = case.checks(spread)
+    decide_claims(report, [claim for claim in load_claims(study.name) if claim["id"] in checks], checks)
+    found = {claim["id"]: claim["verdict"] for claim in report.claims}
     for row in published_rows(study.name):
         compared = judge(row, report.recorded)
         if compared is not None:

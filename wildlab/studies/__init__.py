@@ -1,7 +1,8 @@
-"""The cases of the two theses, a folder each: what is computed and claimed, and how it is shown and said.
+"""The cases of the two theses, a file each: what is computed on a flight, and figures of it.
 
-`protocol` says what a case has to offer. What several share stands beside the folders: `monte_carlo` (many
-simulated flights beside the print) and `single_target` (figures of one target's tracks).
+`protocol` says what a case offers, `rules` how units, claims and answers are read from ``data/studies``,
+`page` what a page is made of. What several share: `monte_carlo` (many simulated flights beside the print),
+`single_target` and `coverage_maps` (figures).
 
 H is the doctoral thesis of H. H. Helgesen (NTNU, 2019), F the master's thesis of A. Flodell and
 C. Christensson (Linköping University, 2016): see ``docs/references.md``.

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError
 from wildlab.evaluation.intervals import LEVEL, Interval, median_interval, share_interval
@@ -24,13 +23,12 @@ from wildlab.messages.quantities import number, percent
 from wildlab.reporting.published import (
     SHARE_OF_IMAGES,
     bounds_of,
-    load_claims,
     quantity_kind,
     share_below,
     size_name,
 )
 from wildlab.reporting.report import Report
-from wildlab.studies.protocol import Study
+from wildlab.studies.rules import keys_of
 
 #: Headings of the table that `decide_claims` gives.
 CLAIM_COLUMNS = {
@@ -54,7 +52,9 @@ CLAIMS_EXPLAINED = (
 )
 
 
-def record_spread(report: Report, study: Study, spread: pd.DataFrame, n: Mapping[str, int]) -> None:
+def record_spread(
+    report: Report, unit_of: Callable[[str], str | None], spread: pd.DataFrame, n: Mapping[str, int]
+) -> None:
     """Record medians over flights, as their range what `bounds_of` gives, and the flights below the print.
 
     A signed mean that is published is recorded by its size as well, which is what it is compared by where
@@ -62,17 +62,16 @@ def record_spread(report: Report, study: Study, spread: pd.DataFrame, n: Mapping
 
     Parameters
     ----------
-    study
-        It says what is recorded, and in which unit.
+    unit_of
+        The unit of a number by its name; None where it is not recorded.
     spread
         Columns (subject, name), one row for each flight; a flight on which a quantity was not computed has
         NaN.
     n
         How many observations stand behind each subject, where that is known.
     """
-    columns: Any = spread.columns
-    for subject, name in columns:
-        unit = None if study.unit_of is None else study.unit_of(name)
+    for subject, name in keys_of(spread):
+        unit = unit_of(name)
         if unit is None:
             continue
         values, printed = spread[subject, name], report.printed(name, subject)
@@ -144,16 +143,19 @@ def _record(
     )
 
 
-def decide_claims(report: Report, study: str, checks: Mapping[str, Check | ArrayLike]) -> pd.DataFrame:
-    """Record the verdict on each claim of a study, and return them as a table of `CLAIM_COLUMNS`.
+def decide_claims(
+    report: Report, claims: Sequence[Mapping[str, Any]], checks: Mapping[str, Check]
+) -> pd.DataFrame:
+    """Record the verdict on each claim, and return them as a table of `CLAIM_COLUMNS`.
 
     A claim that ``needs`` what no simulated flight has cannot be decided; it asks for no check.
 
     Parameters
     ----------
+    claims
+        As `wildlab.reporting.published.load_claims` gives them, with the thresholds of vague words.
     checks
-        By the claim's id what the flights give for it, or (flights,) bools: of which it is true. The
-        thresholds of vague words are those of ``data/published``.
+        By the claim's id what the flights give for it.
 
     Raises
     ------
@@ -161,7 +163,7 @@ def decide_claims(report: Report, study: str, checks: Mapping[str, Check | Array
         If a claim has no check, or a check needs a threshold that is not stated.
     """
     rows = []
-    for claim in load_claims(study):
+    for claim in claims:
         text = claim["text"] + (" (Ours, not the thesis's.)" if claim.get("own") else "")
         if "needs" in claim:
             report.claim(claim["id"], claim["text"], UNDECIDABLE)
@@ -177,9 +179,9 @@ def decide_claims(report: Report, study: str, checks: Mapping[str, Check | Array
             raise WildlabError(
                 f"nothing was computed for the claim {claim['id']!r}",
                 "give it a check, or take it out of data/published",
-                field=study,
+                field=report.study,
             )
-        check = Check.of(checks[claim["id"]])
+        check = checks[claim["id"]]
         threshold = None if "threshold" not in claim else float(claim["threshold"])
         found = decide_check(check, threshold)
         at = {}

@@ -2,18 +2,19 @@
 
 A study computes; its texts lie in ``data/messages/en/<case>.toml`` (`wildlab.messages.catalogue`). What is
 recorded (`wildlab.reporting.report.Report.metric`) are the facts from which the texts' numbers come, and by
-which the study's ``answer`` chooses its sentences.
+which the study's rules choose its sentences (`wildlab.studies.rules`).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from fnmatch import fnmatchcase
 from typing import Any, NamedTuple
 
+import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike
 
 from wildlab.evaluation.shares import (
     ALMOST_ALL,
@@ -27,6 +28,7 @@ from wildlab.evaluation.shares import (
 )
 from wildlab.messages.catalogue import PageTexts, TileText
 from wildlab.messages.quantities import FORMS, number, unit_words
+from wildlab.reporting.published import load_claims
 from wildlab.reporting.report import Report, Wording
 from wildlab.studies.monte_carlo import CLAIM_COLUMNS, CLAIMS_EXPLAINED, decide_claims
 
@@ -57,7 +59,7 @@ class Facts:
     Examples
     --------
     >>> facts = Facts({("mae", "ekf"): {"value": 9.4, "low": 5.0, "high": 14.0}}, {"nis-similar": "holds"})
-    >>> facts.value("ekf", "mae"), facts.holds("nis-similar")
+    >>> float(facts.number("ekf/mae")), facts.holds("nis-similar")
     (9.4, True)
     """
 
@@ -69,14 +71,25 @@ class Facts:
     ) -> None:
         self.recorded, self.verdicts, self.shares = recorded, verdicts, shares or {}
 
-    def value(self, subject: str, name: str, what: str = "value") -> float:
-        """A recorded number, or another entry of it: ``low``, ``high``, ``centre_low``, ``n``."""
-        found = self.recorded.get((name, subject), {}).get(what)
-        return math.nan if found is None else float(found)
+    def number(self, key: str, what: str = "value") -> Any:
+        """A recorded number by "subject/name", or another entry of it, as ``low`` or ``n``.
 
-    def holds(self, *claims: str) -> bool:
-        """Whether all of these claims hold."""
-        return all(self.verdicts.get(one) == HOLDS for one in claims)
+        With ``*`` in the key the numbers of all that fit, one alone where one does.
+        """
+        entries = {f"{subject}/{name}": entry for (name, subject), entry in self.recorded.items()}
+        fit = [
+            entry
+            for known, entry in entries.items()
+            if known == key or ("*" in key and fnmatchcase(known, key))
+        ]
+        found = np.array(
+            [math.nan if (one := entry.get(what)) is None else one for entry in fit or [{}]], float
+        )
+        return found if len(found) > 1 else found[0]
+
+    def holds(self, claim: str) -> bool:
+        """Whether a claim holds."""
+        return self.verdicts.get(claim) == HOLDS
 
     def choose(self, claim: str, yes: str, no: str, unclear: str = "unclear") -> str:
         """``yes`` where the claim holds on most flights or on all, ``no`` where it fails on as many."""
@@ -99,8 +112,8 @@ class Facts:
         split = low > ALMOST_NONE and high < ALMOST_ALL
         return self.choose(claim, "holds", "fails", "split" if split else "few")
 
-    def compare(self, first: tuple[str, str], second: tuple[str, str]) -> str:
-        """Which of two numbers, by (subject, name), is larger.
+    def compare(self, first: str, second: str) -> str:
+        """Which of two numbers, by "subject/name", is larger.
 
         Returns
         -------
@@ -109,17 +122,18 @@ class Facts:
             `ENOUGH_APART` flights; ``unclear`` where they overlap; ``few`` where there is no interval;
             ``unknown`` without a number.
         """
-        if math.isnan(self.value(*first) + self.value(*second)):
+        if math.isnan(self.number(first) + self.number(second)):
             return "unknown"
-        one, other = self._bounds(*first), self._bounds(*second)
-        if any(math.isnan(end) for end in (*one, *other)):
+        one, other = self._bounds(first), self._bounds(second)
+        if np.isnan([*one, *other]).any():
             return "few"
         return "more" if one[0] > other[1] else "less" if other[0] > one[1] else "unclear"
 
-    def _bounds(self, subject: str, name: str) -> tuple[float, float]:
-        flights = self.value(subject, name, "flights")
-        ends = ("low", "high") if flights == ENOUGH_APART else ("centre_low", "centre_high")
-        low, high = (self.value(subject, name, end) for end in ends)
+    def _bounds(self, key: str) -> tuple[float, float]:
+        ends = (
+            ("low", "high") if self.number(key, "flights") == ENOUGH_APART else ("centre_low", "centre_high")
+        )
+        low, high = (float(self.number(key, end)) for end in ends)
         return low, high
 
 
@@ -133,7 +147,7 @@ def show_page(
     title: str,
     answer: Answer,
     figures: Sequence[Shown],
-    checks: Mapping[str, Check | ArrayLike] | None = None,
+    checks: Mapping[str, Check] | None = None,
     tables: Mapping[str, pd.DataFrame] | None = None,
     values: Mapping[str, Any] | None = None,
     thesis: str = "H",
@@ -167,7 +181,7 @@ def show_page(
         If a text, or a number that one names, is missing: a fault of the study.
     """
     wording = Wording(report, texts, values, thesis)
-    decided = None if checks is None else decide_claims(report, report.study, checks)
+    decided = None if checks is None else decide_claims(report, load_claims(report.study), checks)
     facts = Facts(
         report.recorded,
         {one["id"]: one["verdict"] for one in report.claims},

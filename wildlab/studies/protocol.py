@@ -1,11 +1,12 @@
 """What a study is: one case of a thesis, and what the runner and the reports may ask of it.
 
-Everything that belongs to a case lies in its folder, ``wildlab/studies/<case>/`` (hyphens become
-underscores), whose ``__init__.py`` ends in ``STUDY = Study(...)``. ``notebooks/studies.toml`` names the case
-and the flight or twin that a notebook shows it on; nothing else has to be told of a new one, for the folders
-are the list.
+A case is a file of rules, ``data/studies/<case>.toml`` (`wildlab.studies.rules`): units of its numbers, when
+its claims are true, which sentences answer its question. Where something is computed for it there is a
+module, ``wildlab/studies/<case>.py`` (hyphens become underscores), with what is computed on one flight, and
+with its figures. ``notebooks/studies.toml`` names the case and the flight or twin that a notebook shows it
+on; nothing else has to be told of a new one, for the files are the list.
 
-A *trial* is what is computed on one simulated flight, a pure function::
+A *trial* is what is computed on one simulated flight, a pure function of the module::
 
     def trial(seed: int, *, twin: str, runs: int) -> Numbers:
         flight = simulate_twin(twin, seed)
@@ -20,8 +21,8 @@ A *trial* is what is computed on one simulated flight, a pure function::
   value for. Neither a subject nor a name has a ``/`` in it.
 - A flight from which nothing can be concluded (no solution, no observations) raises: `WildlabError` with a
   sentence. The run then names the seed. It never returns NaN throughout in place of an error.
-- It lies in the case's ``trial.py``, which imports nothing of the studies but other cases' ``trial``: the
-  kept numbers of a seed are good as long as these files and the rooms below them do not change.
+- It computes with the cases and the rooms below the studies: the kept numbers of a seed are good as
+  long as these do not change.
 
 `wildlab.runner` spreads the seeds over processes or machines, and the notebook reads the table with
 `wildlab.runner.open_study.trials_table`.
@@ -30,20 +31,18 @@ A *trial* is what is computed on one simulated flight, a pure function::
 from __future__ import annotations
 
 import importlib
+import importlib.util
 import inspect
-import pkgutil
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import pandas as pd
 from numpy.typing import ArrayLike
 
-from wildlab import studies
 from wildlab.errors import WildlabError
-
-if TYPE_CHECKING:
-    from wildlab.evaluation.shares import Check
-    from wildlab.studies.page import Facts
+from wildlab.evaluation.shares import Check
+from wildlab.studies.rules import StudyRules, load_rules, rule_files
 
 #: The parameter of `run_trial` that moves the twins.
 VARIED = "varied"
@@ -60,24 +59,20 @@ class Study:
     Attributes
     ----------
     case
-        Its name: the folder's, with hyphens.
+        Its name.
+    rules
+        Of its numbers, claims and answer.
     trial
         What is computed for a seed; None where the case does not go over simulated flights one by one.
-    check_claims
-        Trials, one row for each flight and columns (subject, name), and whatever else the notebook has to say
-        -> what the flights give for each claim, by the claim's id: a `Check`, or (flights,) bools.
-    unit_of
-        Name of a number of the trial -> its unit in ``metrics.json``; None where it is not recorded.
-    answer
-        What was recorded (`wildlab.studies.page.Facts`) -> keys of the sentences of
-        ``data/messages/en/<case>.toml`` that answer the page's question, the most important first.
+    claim_numbers, claim_functions
+        Trials -> what the rules of claims ask besides, as `StudyRules.checks` takes it.
     """
 
     case: str
+    rules: StudyRules
     trial: Callable[..., Numbers] | None = None
-    check_claims: Callable[..., Mapping[str, Check] | Mapping[str, ArrayLike]] | None = None
-    unit_of: Callable[[str], str | None] | None = None
-    answer: Callable[[Facts], Sequence[str]] | None = None
+    claim_numbers: Callable[[pd.DataFrame], Mapping[str, ArrayLike]] | None = None
+    claim_functions: Callable[[pd.DataFrame], Mapping[str, Callable[..., Any]]] | None = None
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -86,11 +81,16 @@ class Study:
             return ()
         return tuple(name for name in inspect.signature(self.trial).parameters if name != "seed")
 
+    def checks(self, runs: pd.DataFrame, more: Mapping[str, ArrayLike] | None = None) -> dict[str, Check]:
+        """What the flights give for each claim, by its id; parameters as of `StudyRules.checks`."""
+        numbers = {} if self.claim_numbers is None else self.claim_numbers(runs)
+        functions = {} if self.claim_functions is None else self.claim_functions(runs)
+        return self.rules.checks(runs, {**numbers, **(more or {})}, **functions)
+
 
 def case_names() -> tuple[str, ...]:
-    """All cases: the folders of `wildlab.studies`."""
-    found = pkgutil.iter_modules(studies.__path__)
-    return tuple(sorted(module.name.replace("_", "-") for module in found if module.ispkg))
+    """All cases, by their files of rules."""
+    return tuple(sorted(rule_files()))
 
 
 def find_case(case: str) -> Study:
@@ -104,11 +104,13 @@ def find_case(case: str) -> Study:
     if case not in case_names():
         raise WildlabError(
             f"there is no case {case!r}",
-            f"use one of: {', '.join(case_names())}; or give it a folder in wildlab/studies",
+            f"use one of: {', '.join(case_names())}; or give it a file in data/studies",
             field="case",
         )
-    study: Study = importlib.import_module(f"wildlab.studies.{case.replace('-', '_')}").STUDY
-    return study
+    name = f"wildlab.studies.{case.replace('-', '_')}"
+    module = importlib.import_module(name) if importlib.util.find_spec(name) is not None else None
+    offered = ("trial", "claim_numbers", "claim_functions")
+    return Study(case, load_rules(case), *(getattr(module, one, None) for one in offered))
 
 
 def run_trial(case: str, seed: int, parameters: Mapping[str, Any]) -> Values:

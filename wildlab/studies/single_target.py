@@ -22,30 +22,15 @@ from wildlab.reporting.charts.tracks import (
     track_map,
     values_over_flights,
 )
-from wildlab.studies.page import Facts, Shown
+from wildlab.studies.page import Shown
 
 if TYPE_CHECKING:
-    from wildlab.studies.linear_vs_nonlinear.trial import ScoredTrack
+    from wildlab.studies.linear_vs_nonlinear import ScoredTrack
 
 #: Lags of the autocorrelations, in detections: eight seconds of uninterrupted images.
 LAGS = 60
 #: Columns of `filters_table` besides the filter.
 COLUMNS = ("mae", "nees", "nis")
-
-
-def consistency_of(facts: Facts, *filters: str) -> str:
-    """Whether the mean NEES of all these filters, 2 if consistent, is clearly above or below it.
-
-    Returns
-    -------
-    str
-        "overconfident" or "conservative" by the interval of the median, else "unclear"; "unknown" of too few
-        flights.
-    """
-    low, high = ([facts.value(who, "nees", f"centre_{end}") for who in filters] for end in ("low", "high"))
-    if np.isnan([*low, *high]).any():
-        return "unknown"
-    return "overconfident" if min(low) > 2 else "conservative" if max(high) < 2 else "unclear"
 
 
 def flights_figures(
