@@ -13,11 +13,10 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.simulation.twins import simulate_twin
-from wildlab.studies import gating as gating
+from wildlab.studies import gating
 from wildlab.studies.gating import (
     GATES,
     IMAGES,
-    READINGS,
     Outcome,
     Overflight,
     claim_margins,
@@ -54,10 +53,9 @@ def warmed_up(scene: gating.GatingScene, run: int) -> KalmanFilter:
     return kf
 
 
-@pytest.mark.parametrize("assigned", [False, True])
-def test_positions_as_another_filter_gates_them(over, assigned):
+def test_positions_as_another_filter_gates_them(over):
     runs = streams(7, 4)
-    scene, gated = draw_scene(over, runs), gate(over, runs, assigned=assigned)
+    scene, gated = draw_scene(over, runs), gate(over, runs)
     for run in range(4):
         kf = warmed_up(scene, run)
         for t in range(IMAGES):
@@ -66,7 +64,7 @@ def test_positions_as_another_filter_gates_them(over, assigned):
             nis = [v @ np.linalg.inv(S) @ v for v in gated.measured[run, t] - kf.x[:2]]
             np.testing.assert_allclose(gated.nis[0, run, t], nis, rtol=1e-8)
             assert gated.right[0, run, t] == (nis[0] < nis[1])
-            kf.update(gated.measured[run, t, int(np.argmin(nis)) if assigned else 0])
+            kf.update(gated.measured[run, t, 0])
             np.testing.assert_allclose(gated.estimate[0, run, t], kf.x[:2], atol=1e-7)
 
 
@@ -75,14 +73,11 @@ def seen_angles(p_c: Array) -> Array:
     return np.array([np.arctan2(y, x), np.arctan(z / np.hypot(x, y))])
 
 
-@pytest.mark.parametrize(
-    ("form", "assigned"),
-    [("pixels", False), ("pixels", True), ("angles", False), ("angles", True), ("both", True)],
-)
-def test_pixels_and_angles_as_written_out(over, form, assigned):
+@pytest.mark.parametrize("form", ["pixels", "angles", "both"])
+def test_pixels_and_angles_as_written_out(over, form):
     """The extended filter of H (6.4)-(6.11) for single runs, its derivatives by differences."""
     runs = streams(11, 2)
-    scene, gated = draw_scene(over, runs), gate(over, runs, assigned=assigned)
+    scene, gated = draw_scene(over, runs), gate(over, runs)
     f = over.poses.camera.fx
     middle = np.array([over.poses.camera.cx, over.poses.camera.cy])
     R_uv, R_angles = np.diag([360.0, 160.0]), np.diag(np.radians([6.0, 3.0]) ** 2)
@@ -121,9 +116,8 @@ def test_pixels_and_angles_as_written_out(over, form, assigned):
             row = GATES.index(form)
             np.testing.assert_allclose(gated.nis[row, run, t], nis, rtol=1e-4)
             assert gated.right[row, run, t] == (nis[0] < nis[1])
-            used = int(np.argmin(nis)) if assigned else 0
             K = P @ H.T @ np.linalg.inv(S)
-            x = x + K @ gaps[used]
+            x = x + K @ gaps[0]
             P = P - K @ H @ P
 
 
@@ -148,7 +142,7 @@ def test_without_noise_and_far_apart_nothing_goes_wrong(over, monkeypatch):
 
 
 def rates_of(over: Overflight, runs: int, seed: int, chunk: int = 500) -> Array:
-    return outcomes(over, {"": False}, runs, seed, chunk)[""].rate
+    return outcomes(over, runs, seed, chunk).rate
 
 
 def test_a_run_does_not_depend_on_the_others(over):
@@ -160,11 +154,9 @@ def test_a_run_does_not_depend_on_the_others(over):
 
 def test_mistakes_are_counted_apart_and_together(over):
     gated = gate(over, streams(5, 30))
-    found = outcomes(over, {"": False}, 30, 5)[""]
+    found = outcomes(over, 30, 5)
     pixels, angles = ~gated.right[1], ~gated.right[2]
-    np.testing.assert_allclose(found.mistakes[0] + found.mistakes[2], 100 * pixels.mean(axis=1))
-    np.testing.assert_allclose(found.mistakes[1] + found.mistakes[2], 100 * angles.mean(axis=1))
-    np.testing.assert_allclose(found.mistakes[2], 100 * (pixels & angles).mean(axis=1))
+    assert found.mistaken.tolist() == (pixels | angles).any(axis=1).tolist()
     assert found.same_images.tolist() == [bool((p == a).all()) for p, a in zip(pixels, angles, strict=True)]
     # Both gates on the same track: their distances added, and the smaller sum taken.
     np.testing.assert_allclose(gated.nis[3], gated.nis[1] + gated.nis[2])
@@ -203,19 +195,6 @@ def test_the_stretch_is_the_nearest_and_the_gimbal_follows(flight, over):
     assert np.all((uv[:, 0] > 0) & (uv[:, 0] < camera.width))
 
 
-def test_what_feeds_the_track(over):
-    runs = streams(1, 60)
-    fed = {name: gate(over, runs, assigned=assigned) for name, assigned in READINGS.items()}
-    own = fed["own"]
-    # Gated by angles and updated by pixels, the track fed with its own is that of the pixels.
-    np.testing.assert_allclose(own.estimate[2], own.estimate[1])
-    np.testing.assert_allclose(own.estimate[3], own.estimate[1])
-    # Until the first mistake, it is the same track.
-    same = np.cumprod(fed["assigned"].right, axis=2).astype(bool)
-    np.testing.assert_allclose(fed["assigned"].estimate[same], own.estimate[same])
-    assert same.any() and not same.all()
-
-
 def test_a_flight_without_truth_or_too_short(flight):
     with pytest.raises(WildlabError, match="no true poses"):
         overflight(Flight(flight.manifest, {"autopilot": flight.nav["autopilot"]}, flight.tables))
@@ -226,10 +205,10 @@ def test_a_flight_without_truth_or_too_short(flight):
         overflight(Flight(flight.manifest, {"truth": far}, flight.tables))
 
 
-def outcome(rates: Array, mistakes: tuple[float, float, float] = (1, 2, 1), same: float = 0.0) -> Outcome:
-    """Runs whose mistakes are the same, a share of them in the same images."""
+def outcome(rates: Array, mistaken: bool = True, same: float = 0.0) -> Outcome:
+    """Runs with mistakes or without any, a share of them in the same images."""
     n = rates.shape[1]
-    return Outcome(rates, np.tile(np.array(mistakes, float)[:, None], n), np.arange(n) < same * n)
+    return Outcome(rates, np.full(n, mistaken), np.arange(n) < same * n)
 
 
 def test_claims_are_decided_run_by_run():
@@ -261,7 +240,7 @@ def test_a_claim_wants_every_margin_and_chance_decides_none(margins, decided):
 
 
 def test_a_run_without_mistakes_says_nothing_of_where_they_fall():
-    margin = claim_margins(outcome(np.full((4, 6), 100.0), mistakes=(0, 0, 0), same=1.0))
+    margin = claim_margins(outcome(np.full((4, 6), 100.0), mistaken=False, same=1.0))
     assert np.isnan(margin["mistakes-on-different-images"]).all()
 
 

@@ -15,7 +15,6 @@ from textwrap import fill
 from typing import Any, NamedTuple
 
 import numpy as np
-import pandas as pd
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -33,7 +32,6 @@ from wildlab.reporting.charts.forms import Values, draw_lines
 from wildlab.reporting.figures import (
     BLUE,
     GREEN,
-    GREY,
     INK,
     ORANGE,
     PURPLE,
@@ -58,6 +56,9 @@ from wildlab.tracking.sensors import (
 FORMS = ("position", "pixels", "angles")
 #: What a detection is associated by: a form, or pixels and angles together.
 GATES = (*FORMS, "both")
+#: What updates a track, and what is associated on it: pixels are used in the update and angles for gating (H
+#: 6.3.2).
+UPDATES = {"position": ("position",), "pixels": ("pixels", "angles")}
 
 #: H 6.4.3: 141 images at 10 Hz; the second target 10 m north and 15 m east of the main one, each displaced
 #: by 10 m per axis; 50 iterations of the filter before, on the true position with 10 m of noise per axis.
@@ -106,7 +107,7 @@ class Gated(NamedTuple):
 
     right: NDArray[np.bool_]  # (4, N, T)
     nis: Array  # (4, N, T, 2)
-    estimate: Array  # (4, N, T, 2) north, east after the update
+    estimate: Array  # (2, N, T, 2) north, east after the update, by `UPDATES`
     measured: Array  # (N, T, 2, 2) georeferenced detections
     targets: Array  # (N, 2, 2) true positions
 
@@ -204,60 +205,43 @@ def draw_scene(over: Overflight, runs: list[np.random.SeedSequence]) -> GatingSc
     )
 
 
-def gate(over: Overflight, runs: list[np.random.SeedSequence], *, assigned: bool = False) -> Gated:
+def gate(over: Overflight, runs: list[np.random.SeedSequence]) -> Gated:
     """Every image of every run, associated by each of `GATES`. Keeps everything: for some 1000 runs.
 
-    What updates the track is not published: the main object's own measurement, or the one ``assigned``.
+    What updates the track is not published; here it is the main object's own measurement.
     """
-    return _gate(draw_scene(over, runs), assigned=assigned)
+    return _gate(draw_scene(over, runs))
 
 
 class Outcome(NamedTuple):
-    """What became of each of N runs, per cent of its images."""
+    """What became of each of N runs."""
 
-    rate: Array  # (4, N) associated rightly, gates in the order of `GATES`
-    mistakes: Array  # (3, N) wrong by pixels alone, by angles alone, by both
-    same_images: NDArray[np.bool_]  # (N,) whether pixels and angles are wrong in exactly the same images
+    rate: Array  # (4, N) per cent of the images associated rightly, gates in the order of `GATES`
+    mistaken: NDArray[np.bool_]  # (N,) whether pixels or angles are ever wrong
+    same_images: NDArray[np.bool_]  # (N,) whether both are wrong in exactly the same images
 
 
-def outcomes(
-    over: Overflight, readings: Mapping[str, bool], runs: int, seed: int, chunk: int = 500
-) -> dict[str, Outcome]:
-    """What became of each run by each reading, on the same draws.
+def outcomes(over: Overflight, runs: int, seed: int, chunk: int = 500) -> Outcome:
+    """What became of each run.
 
     Parameters
     ----------
     over
         The flight, from `overflight`.
-    readings
-        By name, whether the assigned measurement updates the track; see `gate`.
     runs, seed
         How many, and of their streams; see `streams`.
     chunk
         Runs held in memory at a time; the numbers do not depend on it.
-
-    Returns
-    -------
-    dict
-        By the names of ``readings``.
     """
     sources = streams(seed, runs)
-    parts: dict[str, list[Outcome]] = {name: [] for name in readings}
-    for first in range(0, runs, chunk):
-        scene = draw_scene(over, sources[first : first + chunk])
-        for name, assigned in readings.items():
-            parts[name].append(_outcome(_gate(scene, assigned=assigned)))
-    return {
-        name: Outcome(*(np.concatenate(values, axis=-1) for values in zip(*some, strict=True)))
-        for name, some in parts.items()
-    }
+    parts = [_outcome(gate(over, sources[first : first + chunk])) for first in range(0, runs, chunk)]
+    return Outcome(*(np.concatenate(values, axis=-1) for values in zip(*parts, strict=True)))
 
 
 def _outcome(done: Gated) -> Outcome:
-    pixels, angles = (~done.right[GATES.index(form)] for form in ("pixels", "angles"))
-    apart = np.stack([pixels & ~angles, angles & ~pixels, pixels & angles])
-    same = (pixels == angles).all(axis=-1)
-    return Outcome(100 * done.right.sum(axis=-1) / IMAGES, 100 * apart.sum(axis=-1) / IMAGES, same)
+    pixels, angles = (done.right[GATES.index(form)] for form in ("pixels", "angles"))
+    rate = 100 * done.right.sum(axis=-1) / IMAGES
+    return Outcome(rate, ~(pixels & angles).all(axis=-1), (pixels == angles).all(axis=-1))
 
 
 def _warm_up(scene: GatingScene) -> tuple[Array, Array]:
@@ -293,7 +277,7 @@ def expected(form: str, position: Array, poses: CameraPoses) -> tuple[Array, Arr
     return np.stack([np.arctan2(y, x), np.arctan2(z, level)], axis=-1), slopes
 
 
-def _gate(scene: GatingScene, *, assigned: bool) -> Gated:
+def _gate(scene: GatingScene) -> Gated:
     poses, pixels = scene.poses, scene.pixels
     lens = poses.p_nc[:, :, None], poses.R_nc[:, :, None]
     ground = pixel_to_plane(poses.camera, pixels, *lens, 0.0)[..., :2]
@@ -301,82 +285,46 @@ def _gate(scene: GatingScene, *, assigned: bool) -> Gated:
     measured = dict(zip(FORMS, (ground, pixels, angles), strict=True))
     F, Q = constant_velocity(1 / RATE_HZ, SD_ACCELERATION)
     N, T = pixels.shape[:2]
-    right = np.empty((len(GATES), N, T), bool)
-    nis, estimate = np.empty((len(GATES), N, T, 2)), np.empty((len(GATES), N, T, 2))
-    for row, by in enumerate(GATES):
-        forms = ("pixels", "angles") if by == "both" else (by,)
-        # H 6.3.2: pixels are used in the update and angles for gating.
-        update = "position" if by == "position" else "pixels"
+    nis, estimate = np.empty((len(GATES), N, T, 2)), np.empty((len(UPDATES), N, T, 2))
+    for row, (update, forms) in enumerate(UPDATES.items()):
         x, P = _warm_up(scene)
         P = np.tile(P, (N, 1, 1))
         for t in range(T):
             x, P = predict(x, P, F, Q)
-            here, d = poses.take((slice(None), t)), np.zeros((N, 2))
+            here = poses.take((slice(None), t))
             with np.errstate(divide="ignore", invalid="ignore"):
                 for form in forms:
                     h, H = expected(form, x[:, :2], here)
                     S = H @ P[:, :2, :2] @ np.swapaxes(H, -1, -2) + R_FORM[form]
                     v = difference(measured[form][:, t], h[:, None], (form == "angles", False))
-                    d += innovation_squared(v, S[:, None])
-                nearest = np.where(np.isfinite(d), d, np.inf).argmin(axis=1)
-                known = np.isfinite(d).any(axis=1)
-                z = measured[update][np.arange(N), t, nearest if assigned else 0]
+                    nis[GATES.index(form), :, t] = innovation_squared(v, S[:, None])
                 h, H = expected(update, x[:, :2], here)
-                gap = z - h
+                gap = measured[update][:, t, 0] - h
                 step = correct(x, P, gap, on_state(H, 4), R_FORM[update])
-            used = np.asarray(np.isfinite(gap).all(axis=1) & (known | (not assigned)))
+            used = np.asarray(np.isfinite(gap).all(axis=1))
             x, P = np.where(used[:, None], step.x, x), np.where(used[:, None, None], step.P, P)
-            right[row, :, t], nis[row, :, t], estimate[row, :, t] = known & (nearest == 0), d, x[:, :2]
+            estimate[row, :, t] = x[:, :2]
+    nis[GATES.index("both")] = nis[GATES.index("pixels")] + nis[GATES.index("angles")]
+    known = np.isfinite(nis)
+    right = known.any(axis=-1) & (np.where(known, nis, np.inf).argmin(axis=-1) == 0)
     return Gated(right, nis, estimate, ground, scene.targets)
 
 
-#: The reading that is compared with published rates and that decides the claims.
-DEFAULT = "own"
-#: The one that shows what mistakes do to a tracker that believes them.
-STRESS = "assigned"
-#: Whether the assigned measurement updates the track, by reading.
-READINGS = {DEFAULT: False, STRESS: True}
-#: Less than this share of right associations (per cent) is mostly wrong.
-MOSTLY_WRONG = 50.0
 #: Success rates (per cent) of the run that H 6.4.3 shows, in the order of `FORMS`.
 PUBLISHED_RUN = (91.5, 91.5, 92.2)
 
 
-def subject(gate: str, reading: str) -> str:
-    """Under what name a gate's numbers by a reading are recorded; by the default reading it is the gate's."""
-    name = "pixels-and-angles" if gate == "both" else gate
-    return name if reading == DEFAULT else f"{name}/updated-with-{reading}"
-
-
-def mostly_wrong(rates: Array) -> Array:
-    """Share of the runs (%) in which more than half of the images are wrong; (k, runs) -> (k,)."""
-    return np.asarray(100 * (rates < MOSTLY_WRONG).mean(axis=1))
-
-
-def metrics_of(outcomes: Mapping[str, Outcome]) -> list[dict[str, Any]]:
+def metrics_of(outcome: Outcome) -> list[dict[str, Any]]:
     """Every mean rate with its standard error."""
     return [
-        {"name": name, "subject": subject(gate, reading), "value": value, "unit": "%", "n": len(rates)}
-        for reading, one in outcomes.items()
-        for gate, rates in zip(GATES, one.rate, strict=True)
+        {"name": name, "subject": gate, "value": value, "unit": "%", "n": len(rates)}
+        for gate, rates in zip((*FORMS, "pixels-and-angles"), outcome.rate, strict=True)
         for name, value in (("success_rate", rates.mean()), ("success_rate_se", standard_error(rates)))
     ]
 
 
-def rates_table(outcomes: Mapping[str, Outcome], names: Mapping[str, str]) -> pd.DataFrame:
-    """For each reading mean success rates (%) by each gate, and the runs (%) mostly wrong by angles."""
-    return pd.DataFrame(
-        [
-            {"reading": names[f"updated-with-{reading}"]}
-            | dict(zip(GATES, one.rate.mean(axis=1), strict=True))
-            | {"mostly_wrong": mostly_wrong(one.rate)[GATES.index("angles")]}
-            for reading, one in outcomes.items()
-        ]
-    )
-
-
 def typical_run(over: Overflight, sources: Sequence[np.random.SeedSequence]) -> Gated:
-    """Of some runs by the default reading the one whose rates are nearest to those of H's single run."""
+    """Of some runs the one whose rates are nearest to those of H's single run."""
     runs = list(sources)
     shares = 100 * gate(over, runs).right[: len(FORMS)].mean(axis=2)
     chosen = int(np.abs(shares.T - PUBLISHED_RUN).max(axis=1).argmin())
@@ -399,7 +347,7 @@ def claim_margins(outcome: Outcome) -> dict[str, Array]:
     """
     rates = dict(zip(GATES, outcome.rate, strict=True))
     pairs = [(rates[a], rates[b]) for i, a in enumerate(FORMS) for b in FORMS[i + 1 :]]
-    differ = np.where(outcome.mistakes.sum(axis=0) > 0, 0.5 - outcome.same_images, np.nan)
+    differ = np.where(outcome.mistaken, 0.5 - outcome.same_images, np.nan)
     return {
         "forms-agree": np.stack([1 - sign * (a - b) for a, b in pairs for sign in (1, -1)]),
         "angles-least-accurate": np.stack([rates[form] - rates["angles"] for form in ("position", "pixels")]),
@@ -426,37 +374,23 @@ _OBJECTS = {"main object": BLUE, "second object": ORANGE}
 
 
 def plot_rates(
-    outcomes: Mapping[str, Outcome], published: Mapping[tuple[str, str], float], names: Mapping[str, str]
+    outcome: Outcome, published: Mapping[tuple[str, str], float], names: Mapping[str, str]
 ) -> Figure:
-    """Mean success rates by the default reading; ``published`` by subject and name, hollow.
+    """Mean success rates; ``published`` by subject and name, hollow.
 
     Bars are twice the standard error, the published ones' with the same spread between runs.
     """
     fig, ax = new_figure(5.6, 3.9)
     at, look = np.arange(len(GATES)), {"ms": 7, "capsize": 3}
-    rates = outcomes[DEFAULT].rate
-    twice, label = [2 * standard_error(runs) for runs in rates], names[f"updated-with-{DEFAULT}"]
-    ax.errorbar(at, rates.mean(axis=1), twice, fmt="s", color=BLUE, label=label, **look)
-    spread = rates.std(axis=1, ddof=1)[: len(FORMS)]
+    twice = [2 * standard_error(runs) for runs in outcome.rate]
+    ax.errorbar(at, outcome.rate.mean(axis=1), twice, fmt="s", color=BLUE, label="here", **look)
+    spread = outcome.rate.std(axis=1, ddof=1)[: len(FORMS)]
     printed = [published[form, "success_rate"] for form in FORMS]
     hollow = {"fmt": "D", "mfc": "white", "mec": INK, "ecolor": INK, "label": "published"}
     ax.errorbar(at[: len(FORMS)], printed, 2 * spread / np.sqrt(PUBLISHED_RUNS), **hollow, **look)
     ax.set_xticks(at, [fill(names[gate], 11) for gate in GATES])
     ax.set_xlim(-0.5, len(GATES) - 0.5)
     return finish(fig, "", ylabel="right associations (%)")
-
-
-def plot_distributions(outcomes: Mapping[str, Outcome], names: Mapping[str, str]) -> Figure:
-    """Distribution of the success rate over runs: solid by the default reading, dotted in the stress test."""
-    fig, ax = new_figure(5.6, 3.9)
-    for name, style in ((DEFAULT, "-"), (STRESS, ":")):
-        for form, runs in zip(FORMS, outcomes[name].rate[: len(FORMS)], strict=True):
-            share = 100 * np.arange(1, len(runs) + 1) / len(runs)
-            label = names[form] if name == DEFAULT else None
-            ax.plot(np.sort(runs), share, style, color=_COLOURS[form], label=label)
-    ax.plot([], [], ":", color=GREY, label=names[f"updated-with-{STRESS}"])
-    ax.set(xlim=(0, 100), ylim=(0, 100))
-    return finish(fig, "", "right associations in a run (%)", "runs with no more than that (%)")
 
 
 def plot_right_and_wrong(one: Gated, names: Mapping[str, str]) -> Figure:
@@ -484,18 +418,11 @@ def plot_nis(one: Gated, form: str) -> Figure:
 
 
 def plot_estimates(one: Gated, names: Mapping[str, str]) -> Figure:
-    """Where the three forms have the main object of a single run; forms with the same track share a line."""
-    groups: list[list[int]] = []
-    for row in range(len(FORMS)):
-        same = [group for group in groups if np.allclose(one.estimate[group[0]], one.estimate[row])]
-        if same:
-            same[0].append(row)
-        else:
-            groups.append([row])
+    """Where the forms have the main object of a single run; those with the same track share a line."""
     fig, ax = new_figure(5.0, 4.8)
-    for group in groups:
-        label = "; ".join(names[FORMS[row]] for row in group)
-        draw_way(ax, one.estimate[group[0], 0], _COLOURS[FORMS[group[0]]], label, width=0.8, marker=".", ms=3)
+    for way, forms in zip(one.estimate, UPDATES.values(), strict=True):
+        label = "; ".join(names[form] for form in forms)
+        draw_way(ax, way[0], _COLOURS[forms[0]], label, width=0.8, marker=".", ms=3)
     ax.plot(*one.targets[0, 0, ::-1], "k+", ms=13, mew=2, label="main object, truth")
     map_axes(ax)
     return finish(fig, "")
