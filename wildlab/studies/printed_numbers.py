@@ -9,34 +9,17 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike
 
 from wildlab.flight.files import read_toml
-from wildlab.geometry.frames import Array
 from wildlab.paths import DATA
 from wildlab.reporting.charts.forms import Values, rows_chart
 from wildlab.reporting.figures import BLUE, INK, VERMILLION
 from wildlab.reporting.published import published_values
+from wildlab.studies.rules import Rules
 
 #: By which factor two published numbers of one thing may differ and still agree: words like "approximately"
 #: and "nearly", and the last digit given. Set once, for all.
 MARGIN = 1.05
-#: Mean of the two focal lengths of H (2.3), px.
-FOCAL_LENGTH = (1159.2 + 1167.8) / 2
-STUDIES = (
-    "static-point",
-    "slow-vessel",
-    "linear-vs-nonlinear-fast",
-    "linear-vs-nonlinear-slow",
-    "coloured-noise-fast",
-    "coloured-noise-drifting",
-    "schmidt-fast-vessel",
-    "schmidt-slow-vessel-eight",
-    "schmidt-drifting-vessel-eight",
-)
-
-#: Published numbers by (subject, name), by study.
-Published = Mapping[str, Mapping[tuple[str, str], float]]
 
 
 class Pair(NamedTuple):
@@ -57,91 +40,26 @@ class Pair(NamedTuple):
         return not 1 / MARGIN <= self.ratio <= MARGIN
 
 
-def rescaled_nis(nis: ArrayLike, sd: ArrayLike, other_sd: ArrayLike) -> Array:
-    """NIS of the same innovations with another standard deviation of the measurement noise, in one unit.
-
-    Where the noise makes nearly all of the innovation's covariance, NIS goes with its inverse (H 3.12). The
-    more the state's own covariance counts, the less NIS changes: this is its largest change.
-
-    Examples
-    --------
-    >>> float(rescaled_nis(0.5, 20.0, 10.0))
-    2.0
-    """
-    return np.asarray(np.asarray(nis, float) * (np.asarray(sd, float) / other_sd) ** 2)
+def published_number(key: str) -> float:
+    """A published number by "study/subject/name"."""
+    study, subject, name = key.split("/")
+    return published_values(study)[subject, name]
 
 
-def rest_of(total: ArrayLike, part: ArrayLike) -> Array:
-    """The independent error that, with ``part``, adds up to ``total`` in squares; NaN where there is none.
-
-    Examples
-    --------
-    >>> float(rest_of(5.0, 3.0))
-    4.0
-    """
-    with np.errstate(invalid="ignore"):
-        return np.asarray(np.sqrt(np.asarray(total, float) ** 2 - np.asarray(part, float) ** 2))
-
-
-def _mean_of_the_slow_vessel(published: Published) -> tuple[float, float]:
-    numbers = published["slow-vessel"]
-    return float(np.hypot(numbers["observer", "mean_north"], numbers["observer", "mean_east"])), 2.0
-
-
-def _reference(published: Published) -> tuple[float, float]:
-    """H 5.6.2: angles that make the error of table 5.4 from 350 m, from 200 m; the rest of table 5.6."""
-    images = published["static-point"]["observer", "mae"] * 200.0 / 350.0
-    rest = float(rest_of(published["slow-vessel"]["observer", "mae"], images))
-    return rest, published["coloured-noise-drifting"]["cv", "mae"]
-
-
-def _nis_of_two_noises(published: Published) -> tuple[float, float]:
-    numbers, metres = published["linear-vs-nonlinear-slow"], 30.0 * 300.0 / FOCAL_LENGTH
-    return numbers["ekf", "nis"], float(rescaled_nis(numbers["kf", "nis"], 10.0, metres))
-
-
-def _nis_of_two_poses_fast(published: Published) -> tuple[float, float]:
-    observer = published["linear-vs-nonlinear-fast"]["ekf", "nis"]
-    return published["schmidt-fast-vessel"]["ekf", "nis"], float(rescaled_nis(observer, 20.0, 30.0))
-
-
-_PAIRS: Mapping[str, Callable[[Published], tuple[float, float]]] = {
-    "noise-by-altitude": lambda _: (17.5, 0.05 * 300.0),
-    "mean-within-two-metres": _mean_of_the_slow_vessel,
-    "images-in-view": lambda _: (400.0, (80 - (50 - 20) - (80 - 72)) * 7.5),
-    "frame-rate": lambda _: (141 / 14.0, 7.5),
-    "images-of-the-first-case": lambda _: (8000.0, 25 * 60 * 7.5),
-    "altitude": lambda _: ((200.0 + 300.0) / 2, 200.0),
-    "reference": _reference,
-    "pixels-and-metres": lambda _: (7.0, 20.0 * 350.0 / FOCAL_LENGTH),
-    "nis-of-two-noises": _nis_of_two_noises,
-    "nis-of-two-poses-fast": _nis_of_two_poses_fast,
-    "nis-of-two-poses-slow": lambda published: (
-        published["schmidt-slow-vessel-eight"]["ekf", "nis"],
-        published["linear-vs-nonlinear-slow"]["ekf", "nis"],
-    ),
-    "the-same-filter-twice": lambda published: (
-        published["coloured-noise-fast"]["cv", "mae"],
-        published["linear-vs-nonlinear-fast"]["kf", "mae"],
-    ),
-}
-
-
-def load_numbers() -> dict[str, dict[tuple[str, str], float]]:
-    """Published numbers of `STUDIES` by study, and by (subject, name)."""
-    return {study: dict(published_values(study)) for study in STUDIES}
-
-
-def all_pairs(published: Published | None = None) -> list[Pair]:
-    """Every pair, in the order of the thesis's subjects; ``published`` left out, what is published."""
-    numbers = load_numbers() if published is None else published
-    return [Pair(key, *compute(numbers)) for key, compute in _PAIRS.items()]
+def all_pairs(number: Callable[[str], float] = published_number) -> list[Pair]:
+    """Every pair, in the order of the thesis's subjects; ``number`` gives what is published."""
+    words = load_words()
+    rules = Rules(number, words["given"])
+    return [
+        Pair(key, *(float(rules(one[side])) for side in ("one", "other")))
+        for key, one in words["pair"].items()
+    ]
 
 
 @lru_cache
 def load_words() -> Mapping[str, Any]:
-    """What each pair is about: ``data/printed_numbers.toml``."""
-    return read_toml(DATA / "printed_numbers.toml", "the words of pairs")
+    """The pairs and what each is about: ``data/printed_numbers.toml``."""
+    return read_toml(DATA / "printed_numbers.toml", "the pairs of numbers")
 
 
 def pairs_table(pairs: list[Pair]) -> pd.DataFrame:
