@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from functools import reduce
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -11,16 +12,10 @@ import pandas as pd
 from wildlab.analysis.tracks.many import score_identities, track_jointly
 from wildlab.analysis.tracks.noise_model import SensorTuning
 from wildlab.evaluation.identities import Identities
+from wildlab.flight.files import check_model, read_toml
 from wildlab.flight.store import Flight
-from wildlab.flight.tracking_settings import (
-    HullPart,
-    ManySensorPart,
-    ManyTargetsPart,
-    NoisePart,
-    SensorPart,
-    Settings,
-    TargetsPart,
-)
+from wildlab.flight.tracking_settings import Settings
+from wildlab.paths import DATA
 from wildlab.reporting.many_tracks import LARGEST, SMALLEST, rms_error
 from wildlab.reporting.report import Report
 from wildlab.studies.autoferry import tune_sensor
@@ -39,20 +34,6 @@ RADAR_REACH_M = 200.0
 LIDAR_REACH_M = {"havfruen": 105.0, "gunnerus": 125.0, "jet-boat": 70.0}
 #: Of a boat whose size is not known, m.
 USUAL_REACH_M = 105.0
-#: A boat of which nothing is known, and the ship among them.
-BOAT_LENGTH_M, BOAT_BEAM_M, SHIP_LENGTH_M, SHIP_BEAM_M = 6.0, 2.5, 28.0, 8.0
-#: Nothing in a harbour is faster, m/s.
-FASTEST_M_S = 10.0
-
-
-def scale(rng: np.random.Generator, low: float, high: float) -> float:
-    """A random number between two above zero, evenly over their logarithm."""
-    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
-
-
-def even(rng: np.random.Generator, low: float, high: float) -> float:
-    """A random number between two others."""
-    return float(rng.uniform(low, high))
 
 
 class Tuned(NamedTuple):
@@ -83,99 +64,38 @@ def errors_of(flight: Flight) -> dict[str, SensorTuning]:
 
 
 def draw(rng: np.random.Generator, errors: Mapping[str, SensorTuning]) -> Settings:
-    """Everything that the tracker is told, from ranges that are wide and mean something.
-
-    Scales are drawn evenly over their logarithm, shares and distances evenly.
+    """Everything that the tracker is told, from the ranges of ``data/drawn_settings.toml``.
 
     Parameters
     ----------
     errors
         From `errors_of`.
     """
-    targets = ManyTargetsPart(
-        hulls=(
-            HullPart(name="boat", length_m=BOAT_LENGTH_M, beam_m=BOAT_BEAM_M, share=0.6),
-            HullPart(name="ship", length_m=SHIP_LENGTH_M, beam_m=SHIP_BEAM_M, share=0.4),
-        ),
-        lifetime_s=scale(rng, 20, 200),
-        birth=scale(rng, 0.03, 0.3),
-        visible_s=scale(rng, 5, 60),
-        hidden_s=scale(rng, 3, 40),
-        gate=even(rng, 2.5, 4.5),
-        confirmed=float(rng.choice([0.9, 0.95, 0.98, 0.99])),
-        hits=int(rng.choice([3, 4, 5])),
-        shown=even(rng, 0.2, 0.9),
-        forgotten=0.02,
-        lost_m=SHIP_LENGTH_M,
-        fastest_m_s=FASTEST_M_S,
-        moves_m=even(rng, 4, 12),
-        over_s=even(rng, 8, 20),
-        apart_m=5.0,
-    )
-    side = scale(rng, 0.3, 2.5), scale(rng, 1, 7)
-    lidar = ManySensorPart(
-        detection=even(rng, 0.6, 0.9),
-        clutter_per_m2=scale(rng, 5e-7, 2e-5),
-        near_m=even(rng, 5, 20),
-        far_m=even(rng, 105, 140),
-        patience_s=even(rng, 3, 9),
-        several=True,
-        rough_m=(0.0, scale(rng, 0.7, 4)),
-        along_m=(0.0, scale(rng, 3, 9)),
-        near_side_m=side,
-        near_end_m=(side[0] * even(rng, 1, 3), side[1] * even(rng, 1, 4)),
-    )
-    radar = ManySensorPart(
-        detection=even(rng, 0.75, 0.95),
-        clutter_per_m2=scale(rng, 2e-6, 5e-5),
-        near_m=even(rng, 5, 20),
-        far_m=RADAR_REACH_M,
-        patience_s=even(rng, 4, 10),
-        rough_m=(0.0, scale(rng, 0.7, 4)),
-        along_m=(0.0, scale(rng, 1, 6)),
-        near_side_m=(0.0, 0.0),
-        near_end_m=(0.0, 0.0),
-    )
-    noise = {
-        "lidar": NoisePart(position_m=scale(rng, 0.7, 2.5)),
-        "radar": NoisePart(position_m=scale(rng, 1.5, 4)),
-        "ir": NoisePart(azimuth_deg=scale(rng, 1, 6)),
-        "eo": NoisePart(azimuth_deg=scale(rng, 1, 6)),
-    }
-    parts = {"lidar": lidar, "radar": radar, "ir": _camera(rng), "eo": _camera(rng)}
-    # Errors of a bearing are those of the ship's heading and of the part of the hull that stands out.
-    thinning = {name: scale(rng, 0.5, 5) for name in ("ir", "eo")}
-    return Settings(
-        targets=TargetsPart(
-            acceleration_m_s_sqrt_s=float(np.sqrt(scale(rng, 0.01, 0.3))),
-            start_speed_m_s=even(rng, 2, 5),
-            many=targets,
-        ),
-        sensors={
-            name: SensorPart(
-                clock_offset_s=errors[name].offset_s,
-                noise=noise[name],
-                thinning_s=thinning.get(name),
-                many=part,
-                # Of bearings scans are thinned instead.
-                correlation=None if name in thinning else errors[name].next_correlation,
-                correlation_time_s=None if name in thinning else errors[name].correlation_time_s,
-            )
-            for name, part in parts.items()
-        },
-    )
+    ranges = read_toml(DATA / "drawn_settings.toml", "what settings are drawn from")
+    told: dict[str, Any] = ranges["same"]
+    for path, how in ranges["drawn"].items():
+        *parts, name = path.split(".")
+        reduce(lambda part, one: part.setdefault(one, {}), parts, told)[name] = _drawn(rng, how)
+    hull = told["sensors"]["lidar"]["many"]
+    hull["near_end_m"] = np.multiply(hull["near_side_m"], hull["near_end_m"]).tolist()
+    for name, sensor in told["sensors"].items():
+        sensor["clock_offset_s"] = errors[name].offset_s
+        # Of bearings scans are thinned instead.
+        if "thinning_s" not in sensor:
+            sensor["correlation"] = errors[name].next_correlation
+            sensor["correlation_time_s"] = errors[name].correlation_time_s
+    return check_model(Settings, told, None)
 
 
-def _camera(rng: np.random.Generator) -> ManySensorPart:
-    """It sees all around, as far as the radar or less far."""
-    return ManySensorPart(
-        detection=even(rng, 0.3, 0.9),
-        clutter_per_rad=scale(rng, 0.05, 3),
-        far_m=even(rng, 100, RADAR_REACH_M),
-        patience_s=even(rng, 3, 10),
-        rough_m=(0.0, scale(rng, 0.7, 4)),
-        along_m=(0.0, scale(rng, 3, 9)),
-    )
+def _drawn(rng: np.random.Generator, how: Any) -> Any:
+    if isinstance(how, list):
+        return [_drawn(rng, one) for one in how]
+    if not isinstance(how, dict):
+        return how
+    (kind, values), *_ = how.items()
+    if kind == "of":
+        return np.asarray(rng.choice(values)).item()
+    return float(np.exp(rng.uniform(*np.log(values))) if kind == "log" else rng.uniform(*values))
 
 
 def gospa_of(lives: Identities | None) -> float:
