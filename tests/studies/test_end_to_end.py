@@ -111,9 +111,3 @@ def test_own_claims_follow_the_numbers(numbers):
     turned = (better | alike | biased, worse | apart | noisy)
     checks = [checks_of("end-to-end", spread_of(numbers, one)) for one in turned]
     assert turn("end-to-end-fast", *checks)
-
-
-def test_intervals_of_shares_stay_within_all_and_none():
-    values = pd.Series([0.9, 1.0, 1.0])
-    assert end_to_end.interval_text(values, 100, 0, share=True) == "97 (82 to 100)"
-    assert end_to_end.interval_text(values, 100, 0) == "97 (82 to 111)"

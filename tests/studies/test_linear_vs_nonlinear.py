@@ -22,7 +22,6 @@ def flights(*changes: dict[tuple[str, str], float]) -> pd.DataFrame:
     good = {
         ("kf", "mae"): 10.0,
         ("ekf", "mae"): 10.9,
-        ("ukf", "mae"): 10.8,
         ("measurements", "detections"): 101.0,
         ("beside", "lag1"): 0.25,
     }

@@ -161,7 +161,7 @@ def test_a_flight_without_pauses_has_no_numbers_of_them(seen):
     short = few._replace(times=0.1 * few.times)
     assert pauses(short) == []
     found = evaluate(short, track).numbers
-    lacking = {name for name in NAMES | MORE_NAMES if not np.isfinite(found[name])}
+    lacking = {name for name in (*NAMES, *MORE_NAMES) if not np.isfinite(found[name])}
     assert lacking == {
         *("nees_predicted", "mae_predicted", "mae_first_pause", "fraction_above_predicted"),
         *("pauses_above", "nis_top_after_pauses", "rmse_speed_start", "rmse_course_start"),

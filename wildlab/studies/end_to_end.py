@@ -22,6 +22,7 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.covariances import inside_ellipse
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import ground_to_pixel
+from wildlab.messages.quantities import percent_between
 from wildlab.reporting.charts.drawing import draw_dots, finish, name_rows
 from wildlab.reporting.charts.forms import draw_marks, draw_picture
 from wildlab.reporting.figures import BLUE, VERMILLION, new_figure
@@ -30,6 +31,7 @@ from wildlab.simulation.scene.flights import corner_of
 from wildlab.simulation.target_motion import target_path
 from wildlab.studies import coloured_noise as coloured
 from wildlab.studies import linear_vs_nonlinear as filters
+from wildlab.studies.monte_carlo import interval_words
 from wildlab.studies.rules import keys_of, load_rules
 
 Numbers = dict[tuple[str, str], float]
@@ -180,9 +182,7 @@ def track_numbers(seen: Sighting, twin: str) -> Numbers:
     """What the cases that are about a twin's flight compute of a sighting, by (subject, name)."""
     result: Numbers = {}
     if twin in filters.CASES:
-        result |= filters.numbers_of(
-            seen, filters.track_target(seen, filters.CASES[twin].tuning, filters.PUBLISHED)
-        )
+        result |= filters.numbers_of(seen, filters.track_target(seen, filters.CASES[twin].tuning))
     if twin in coloured.TUNINGS:
         tuning = coloured.TUNINGS[twin]
         tracks = coloured.track_target(seen, tuning)
@@ -249,19 +249,6 @@ DETECTIONS = {
 }  # fmt: skip
 
 
-def interval_text(values: pd.Series, scale: float = 1.0, decimals: int = 1, *, share: bool = False) -> str:
-    """Mean over flights with its 95 % interval, that of a ``share`` within 0 and 1; alone of one flight.
-
-    Examples
-    --------
-    >>> interval_text(pd.Series([1.0, 2.0, 3.0]))
-    '2.0 (−0.5 to 4.5)'
-    """
-    found = mean_share_interval(values) if share else mean_interval(values)
-    mean, low, high = (f"{scale * end:.{decimals}f}".replace("-", "\N{MINUS SIGN}") for end in found)
-    return mean if np.isnan(found.low) else f"{mean} ({low} to {high})"
-
-
 def detections_table(runs: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame:
     """The detections themselves, drawn and rendered: means over flights with intervals, shares in per cent.
 
@@ -271,9 +258,12 @@ def detections_table(runs: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFra
     for name, decimals in DETECTIONS.items():
         row = {"quantity": names[name]}
         for kind in KINDS:
-            share, known = decimals is None, (kind, name) in runs
-            scale = 100.0 if share else 1.0
-            row[kind] = interval_text(runs[kind, name], scale, decimals or 0, share=share) if known else ""
+            if (kind, name) not in runs:
+                row[kind] = ""
+            elif decimals is None:
+                row[kind] = percent_between(mean_share_interval(runs[kind, name]), 0)
+            else:
+                row[kind] = interval_words(mean_interval(runs[kind, name]), decimals)
         rows.append(row)
     return pd.DataFrame(rows)
 

@@ -1,17 +1,15 @@
 """Tracking on the ground against tracking in the image: H 6.4.2, on two flights.
 
 The same detections, poses and tuning go through the Kalman filter on georeferenced positions (``kf``) and the
-extended one on pixels (``ekf``); and, beyond the thesis, through an unscented filter on pixels (``ukf``).
+extended one on pixels (``ekf``).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wildlab.analysis.navigate import navigate_observer
 from wildlab.analysis.tracks.sighting import (
@@ -28,10 +26,8 @@ from wildlab.analysis.tracks.sighting import (
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
 from wildlab.simulation.twins import simulate_twin
-from wildlab.tracking.filters import run_unscented
 from wildlab.tracking.motion import Motion, in_steps
 from wildlab.tracking.run import Start, Track
-from wildlab.tracking.sensors import Sensor, pixels
 
 #: Numbers of a flight by (subject, name).
 Numbers = dict[tuple[str, str], float]
@@ -53,25 +49,7 @@ class Case(NamedTuple):
 CASES = {"fast-vessel": Case(OBSERVER, FAST), "slow-vessel-eight": Case(AUTOPILOT, SLOW)}
 
 #: Elements of the innovation, by subject.
-AXES = {"kf": ("north", "east"), "ekf": ("u", "v"), "ukf": ("u", "v")}
-#: The thesis's two filters, and all.
-PUBLISHED, SUBJECTS = ("kf", "ekf"), ("kf", "ekf", "ukf")
-#: Units of the numbers that `evaluate_track` gives, without those of the innovations' autocorrelation.
-UNITS = {
-    "mean_north": "m",
-    "mean_east": "m",
-    "mae": "m",
-    "nees": "1",
-    "nis": "1",
-    "fraction_nees_inside": "1",
-    "fraction_nis_inside": "1",
-    "rmse_speed": "m/s",
-    "rmse_course": "rad",
-    "error_at_end": "m",
-    "p95_measured": "m",
-    "rmse_speed_beginning": "m/s",
-    "mae_georeferenced": "m",
-}
+AXES = {"kf": ("north", "east"), "ekf": ("u", "v")}
 
 
 class ScoredTrack(NamedTuple):
@@ -109,11 +87,6 @@ def sight(flight: Flight, source: str) -> Sighting:
     return sighting(flight, source)
 
 
-def frame_interval(seen: Sighting) -> float:
-    """The time from one frame to the next, s."""
-    return float(np.median(np.diff(seen.times)))
-
-
 def remembered(motion: Motion) -> Motion:
     """A motion model that is asked again and again for the same few steps, and computes each once.
 
@@ -129,21 +102,7 @@ def as_in_frames(seen: Sighting, motion: Motion) -> Motion:
     H (6.2) holds its noise over a step, and the thesis predicted as often as the camera took pictures.
     """
     # A pause of n frames is n steps, and not n + 1 where rounding has made it a little longer.
-    return remembered(partial(in_steps, motion=motion, longest=1.001 * frame_interval(seen)))
-
-
-def detections_of(seen: Sighting) -> tuple[NDArray[np.bool_], Sensor]:
-    """The rows with a detection, and the camera at these rows alone."""
-    rows = seen.seen
-    return rows, pixels(seen.poses.take(rows), seen.plane_down[rows])
-
-
-def _unscented(seen: Sighting, tuning: CvTuning) -> Track:
-    rows, sensor = detections_of(seen)
-    return run_unscented(
-        seen.times[rows], seen.uv[rows], np.eye(2) * tuning.pixel**2, sensor,
-        as_in_frames(seen, tuning.motion), start_on_detections(seen, tuning), output_times=seen.times,
-    )  # fmt: skip
+    return remembered(partial(in_steps, motion=motion, longest=1.001 * float(np.median(np.diff(seen.times)))))
 
 
 def start_on_detections(seen: Sighting, tuning: CvTuning, n: int = 4, **more: float) -> Start:
@@ -153,24 +112,10 @@ def start_on_detections(seen: Sighting, tuning: CvTuning, n: int = 4, **more: fl
     return begin._replace(row=int(np.searchsorted(rows, begin.row)))
 
 
-FILTERS: dict[str, Callable[[Sighting, CvTuning], Track]] = {
-    "kf": follow_positions,
-    "ekf": follow_pixels,
-    "ukf": _unscented,
-}
-
-
-def track_target(
-    seen: Sighting, tuning: CvTuning, subjects: tuple[str, ...] = SUBJECTS
-) -> dict[str, ScoredTrack]:
-    """A sighting through the filters of these names.
-
-    The unscented filter runs over the detections alone, with `as_in_frames`.
-    """
-    tracks = {subject: FILTERS[subject](seen, tuning) for subject in subjects}
-    return {
-        subject: ScoredTrack(one, evaluate_track(seen, one, AXES[subject])) for subject, one in tracks.items()
-    }
+def track_target(seen: Sighting, tuning: CvTuning) -> dict[str, ScoredTrack]:
+    """A sighting through both filters."""
+    tracks = {"kf": follow_positions(seen, tuning), "ekf": follow_pixels(seen, tuning)}
+    return {who: ScoredTrack(one, evaluate_track(seen, one, AXES[who])) for who, one in tracks.items()}
 
 
 def numbers_of(seen: Sighting, tracks: dict[str, ScoredTrack]) -> Numbers:
@@ -184,7 +129,7 @@ def numbers_of(seen: Sighting, tracks: dict[str, ScoredTrack]) -> Numbers:
 
 
 def trial(seed: int, *, twin: str, beside: str) -> Numbers:
-    """One simulated flight through all filters; see `numbers_of`.
+    """One simulated flight through both filters; see `numbers_of`.
 
     Where ``beside`` names the twin of the other flight, its innovations' mean autocorrelation at lag one, on
     a flight of the same seed, is the number ``lag1`` of ``beside``.
@@ -200,9 +145,9 @@ def trial(seed: int, *, twin: str, beside: str) -> Numbers:
     if beside:
         case = case_of(beside)
         _, seen = fly_sighting(beside, seed, case.source)
-        other = numbers_of(seen, track_target(seen, case.tuning, PUBLISHED))
+        other = numbers_of(seen, track_target(seen, case.tuning))
         correlations = [
-            abs(other[who, f"lag1_autocorrelation_{axis}"]) for who in PUBLISHED for axis in AXES[who]
+            abs(other[who, f"lag1_autocorrelation_{axis}"]) for who, axes in AXES.items() for axis in axes
         ]
         found["beside", "lag1"] = float(np.mean(correlations))
     return found

@@ -217,7 +217,9 @@ def decide_claims(
                 "source": claim["source"],
                 "verdict": f"{FITTED} ({claim['fitted']})" if claim.get("fitted") else found.verdict,
                 "share": _share_words(found, check),
-                "difference": "" if apart is None else _difference_words(apart, check.unit),
+                "difference": ""
+                if apart is None
+                else interval_words(apart, 1 if abs(apart.estimate) >= 10 else 2, check.unit),
                 "premise": _premise_words(claim.get("premise", ""), check, found),
                 "threshold": _threshold_words(threshold, at, claim.get("reason", "")),
             }
@@ -242,10 +244,17 @@ def _share_words(found: Any, check: Check) -> str:
     return f"{told} ({low:.0f} to {high:.0f} %){beyond}"
 
 
-def _difference_words(apart: Any, unit: str) -> str:
-    digits = 1 if abs(apart.estimate) >= 10 else 2
-    mean, low, high = (number(value, digits) for value in apart)
-    return f"{mean} ({low} to {high}) {unit}".rstrip()
+def interval_words(found: Interval, digits: int, unit: str = "", least: float = -np.inf) -> str:
+    """A number with its interval, which ends at ``least``; alone where it has none.
+
+    Examples
+    --------
+    >>> interval_words(Interval(2.0, -0.5, 4.5), 1, "m"), interval_words(Interval(2.0, np.nan, np.nan), 1)
+    ('2.0 (−0.5 to 4.5) m', '2.0')
+    """
+    ends = [number(max(end, least), digits) for end in found[1:]]
+    around = f" ({ends[0]} to {ends[1]})" if np.isfinite(found.low) else ""
+    return f"{number(found.estimate, digits)}{around} {unit}".rstrip()
 
 
 def _premise_words(premise: str, check: Check, found: Any) -> str:

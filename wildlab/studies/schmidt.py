@@ -53,7 +53,6 @@ from wildlab.reporting.charts.tracks import (
     speed_and_course,
     squares_over_time,
     track_map,
-    values_over_flights,
 )
 from wildlab.reporting.figures import GREEN, GREY, INK, colour
 from wildlab.reporting.published import bounds_of
@@ -108,33 +107,18 @@ CONSTANT = (*map(constant, DEGREES), *(constant(DEGREES[1], metres) for metres i
 VARIANTS = ("schmidt-attitude-only", "schmidt-position-only")
 FILTERS = ("ekf", *COVARIANCES, *VARIANTS, "ekf-60-pixels")
 SUBJECTS = tuple(dict.fromkeys((*FILTERS, *CURVE, *CONSTANT)))
-#: What is compared for each, with its unit here; `evaluate` says what they are.
-NEES_NAMES = {"nees": "1", "nees_drawn": "1", "nees_worth": "1", "fraction_nees_inside": "1"}
+#: What is compared for each; `evaluate` says what they are.
+NEES_NAMES = ("nees", "nees_drawn", "nees_worth", "fraction_nees_inside")
 #: What is, besides, for all but `CURVE` and `CONSTANT`.
-NAMES = NEES_NAMES | {
-    "mean_north": "m",
-    "mean_east": "m",
-    "mae": "m",
-    "nis": "1",
-    "rmse_speed": "m/s",
-    "rmse_course": "deg",
-    "fraction_nis_inside": "1",
-    "nis_worth": "1",
-    "nees_predicted": "1",
-}
+NAMES = (
+    *NEES_NAMES, "mean_north", "mean_east", "mae", "nis", "rmse_speed", "rmse_course", "fraction_nis_inside",
+    "nis_worth", "nees_predicted",
+)  # fmt: skip
 #: The same for `PUBLISHED` alone: what claims speak of.
-MORE_NAMES = {
-    "fraction_nis_above": "1",
-    "mae_predicted": "m",
-    "mae_first_pause": "m",
-    "fraction_above_predicted": "1",
-    "pauses_above": "1",
-    "nis_top_after_pauses": "1",
-    "oscillation": "m",
-    "mean_speed": "m/s",
-    "rmse_speed_start": "m/s",
-    "rmse_course_start": "deg",
-}
+MORE_NAMES = (
+    "fraction_nis_above", "mae_predicted", "mae_first_pause", "fraction_above_predicted", "pauses_above",
+    "nis_top_after_pauses", "oscillation", "mean_speed", "rmse_speed_start", "rmse_course_start",
+)  # fmt: skip
 
 
 class Compared(NamedTuple):
@@ -321,8 +305,8 @@ def evaluate(seen: Sighting, track: Track, moment: float = 0.0) -> Scored:
 
 def summarise(compared: Compared) -> Numbers:
     """All numbers by (subject, name), and those beside them."""
-    asked = {who: NEES_NAMES for who in SUBJECTS} | {who: NAMES for who in FILTERS}
-    asked |= {who: NAMES | MORE_NAMES for who in PUBLISHED}
+    asked: dict[str, tuple[str, ...]] = dict.fromkeys(SUBJECTS, NEES_NAMES) | dict.fromkeys(FILTERS, NAMES)
+    asked |= dict.fromkeys(PUBLISHED, (*NAMES, *MORE_NAMES))
     scored = compared.scored
     return {
         (who, name): scored[who].numbers[name] for who in SUBJECTS for name in asked[who]
@@ -486,19 +470,6 @@ def nees_over_pose_sd(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
         plain_numbers(ax.xaxis)
     plain_numbers(upper.yaxis)
     return finish(fig, "", "predicted SD of attitude, mean of roll, pitch and yaw (°)", "mean NEES")
-
-
-def nees_of_flights(
-    runs: pd.DataFrame, published: Mapping[tuple[str, str], float], names: Mapping[str, str]
-) -> Figure:
-    """NEES of every flight, a row for each filter; ``published`` by subject and name."""
-    return values_over_flights(
-        pd.DataFrame({who: runs[who, "nees"] for who in FILTERS}),
-        {who: published[who, "nees"] for who in PUBLISHED},
-        names,
-        "NEES of the position, mean over a flight",
-        band=2,
-    )
 
 
 def flight_figures(compared: Compared, first: int, names: Mapping[str, str]) -> list[Shown]:

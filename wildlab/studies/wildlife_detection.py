@@ -39,6 +39,7 @@ from wildlab.simulation.scene.drawn import LandDraw, Layout, draw_layout
 from wildlab.simulation.scene.ground import Weather
 from wildlab.simulation.scene.land import LandView, render_land
 from wildlab.simulation.scene.response import CameraResponse, Sensor, expose, sensor_of, to_counts
+from wildlab.studies.monte_carlo import interval_words
 from wildlab.studies.rules import keys_of
 
 #: When images are taken. F's were mostly taken under clouds, some in sunlight (F 7.4).
@@ -499,12 +500,13 @@ def rates_by_weather(
 
 def methods_table(runs: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame:
     """F1 of every method by weather."""
-    methods = [
-        {"method": names[method]}
-        | {weather: _ranged(rates_of(runs, method, places([weather])).f1) for weather in WEATHERS}
-        for method in (*METHODS, *PROPOSED)
-    ]
-    return pd.DataFrame(methods)
+    rows = []
+    for method in (*METHODS, *PROPOSED):
+        each = {weather: rates_of(runs, method, places([weather])).f1 for weather in WEATHERS}
+        rows.append(
+            {"method": names[method]} | {key: interval_words(f1, 2, least=0.0) for key, f1 in each.items()}
+        )
+    return pd.DataFrame(rows)
 
 
 def _counted(ax: Axes, picture: Picture, method: str, names: Mapping[str, str]) -> None:
@@ -512,9 +514,3 @@ def _counted(ax: Axes, picture: Picture, method: str, names: Mapping[str, str]) 
     found, invented, missed = _thresholded(ax, picture, METHODS[method]).counts
     said = f"{names[method]}\n{found:.0f} of {found + missed:.0f} found, {invented:.0f} false"
     ax.set_title(said, fontsize=10)
-
-
-def _ranged(one: Interval) -> str:
-    if not np.isfinite(one.low):
-        return f"{one.estimate:.2f}"
-    return f"{one.estimate:.2f} ({max(one.low, 0):.2f} to {one.high:.2f})"

@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from wildlab.analysis.animals.images import Detector, Images, take_images
 from wildlab.analysis.animals.tracking import (
@@ -37,11 +37,11 @@ from wildlab.analysis.animals.tracking import (
     turns,
 )
 from wildlab.analysis.plans.coverage import ExecutionErrors, with_errors
-from wildlab.evaluation.intervals import Interval, mean_interval, mean_share_interval, share_interval
+from wildlab.evaluation.intervals import mean_interval, mean_share_interval, share_interval
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
-from wildlab.messages.quantities import number, percent_between
+from wildlab.messages.quantities import percent_between
 from wildlab.planning.areas import check_area, contains
 from wildlab.planning.courses import fly, follow_terrain
 from wildlab.planning.coverage import walks
@@ -63,6 +63,7 @@ from wildlab.simulation.error_models import stream
 from wildlab.simulation.parameters import TwinParameters, load_twin
 from wildlab.studies import gondola_coverage as gondola
 from wildlab.studies import uav_coverage as uav
+from wildlab.studies.monte_carlo import interval_words
 from wildlab.studies.page import Shown
 from wildlab.tracking.motion import Motion
 from wildlab.tracking.particles import Rules, walk_of
@@ -398,61 +399,10 @@ def trial(seed: int, *, twin: str, second: str) -> dict[tuple[str, str], float]:
 _OF_SEARCH = {"minutes": "min", "turns": "", "visits": "", "given_up": "", "rmse": "m", "sd": "m"}
 _SHARES = ("done", "animals_share")
 
-#: From how many worlds on a mean of what cannot be negative has an interval: of two its ends lie a factor of
-#: up to a hundred thousand apart.
-FEWEST = 3
 
-
-def positive_interval(values: ArrayLike) -> Interval | None:
-    r"""Mean over worlds of what cannot be negative, with an interval of 95 % that is not negative either.
-
-    Student's interval with its half width :math:`h` is taken on the logarithm of the mean :math:`m`, whose
-    standard deviation is that of the mean over the mean (delta method): from :math:`m\,e^{-h/m}` to
-    :math:`m\,e^{h/m}`. Values may be zero. Where they hardly spread it is Student's interval. Of
-    few worlds with skewed values no such interval holds the mean as often as it says: of 5 log-normal ones
-    nine times in ten, and of a count that is 0.2 in the mean two times in three; of 40 worlds it does.
-
-    Parameters
-    ----------
-    values
-        (N,), one of each world, none below zero, in any unit; NaN are left out.
-
-    Returns
-    -------
-    Interval or None
-        In the unit of the values; None where fewer than `FEWEST` are known.
-
-    Examples
-    --------
-    >>> [round(x, 2) for x in positive_interval([1.0, 2.0, 3.0])]
-    [2.0, 0.58, 6.93]
-    >>> positive_interval([1.0, 2.0]) is None
-    True
-    """
-    array = np.asarray(values, float)
-    known = array[np.isfinite(array)]
-    if len(known) < FEWEST:
-        return None
-    mean, _, high = mean_interval(known)
-    if mean == 0:
-        return Interval(mean, mean, mean)
-    factor = float(np.exp((high - mean) / mean))
-    return Interval(mean, mean / factor, mean * factor)
-
-
-def positive_cell(values: pd.Series, digits: int = 1, unit: str = "") -> str:
-    """Such a mean and its interval, where it has one, as a table shows it.
-
-    Examples
-    --------
-    >>> positive_cell(pd.Series([1.0, 2.0, 3.0]), unit="m"), positive_cell(pd.Series([1.0, 2.0, np.nan]))
-    ('2.0 m (0.6 to 6.9)', '1.5')
-    """
-    middle = f"{number(values.mean(), digits)} {unit}".rstrip()
-    found = positive_interval(values)
-    if found is None or found.low == found.high:
-        return middle
-    return f"{middle} ({number(found.low, digits)} to {number(found.high, digits)})"
+def mean_cell(values: pd.Series, unit: str = "") -> str:
+    """Mean over worlds of what cannot be negative, with its 95 % interval."""
+    return interval_words(mean_interval(values), 1, unit, least=0.0)
 
 
 def count_cell(count: int, of: int) -> str:
@@ -473,7 +423,7 @@ def tracks_table(runs: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame:
     """Means over worlds of animals out of sight, a row for each platform and filter."""
     rows = []
     for one in (f"{platform}-{each}" for platform in (GONDOLA, UAV) for each in FILTERS):
-        cells = {name: positive_cell(runs[one, name]) for name in ("rmse", "sd", "anees")}
+        cells = {name: mean_cell(runs[one, name]) for name in ("rmse", "sd", "anees")}
         right = count_cell(int(runs[one, "right"].sum()), int(runs[one, "later"].sum()))
         rows.append({"filter": names[one], **cells, "right": right})
     return pd.DataFrame(rows)
@@ -481,7 +431,7 @@ def tracks_table(runs: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame:
 
 def searches_table(runs: pd.DataFrame, quantities: Mapping[str, str]) -> pd.DataFrame:
     """Means over worlds of searches with and without visits to known animals, a row for each number."""
-    cells = {name: {one: positive_cell(runs[one, name], unit=unit) for one in (REVISITS, ROWS)}
+    cells = {name: {one: mean_cell(runs[one, name], unit) for one in (REVISITS, ROWS)}
              for name, unit in _OF_SEARCH.items()}  # fmt: skip
     cells |= {
         name: {one: percent_between(mean_share_interval(runs[one, name]), 0) for one in (REVISITS, ROWS)}
