@@ -11,7 +11,6 @@ import socket
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -27,8 +26,6 @@ from wildlab.flight.readers.formats import read_log
 from wildlab.flight.readers.frames.image import read_image
 from wildlab.flight.store import load_flight, save_flight
 from wildlab.runner.annotation.server import (
-    HEADER_S,
-    MOST_LINKS,
     ClickServer,
     open_server,
 )
@@ -230,36 +227,6 @@ def test_from_a_flight_to_its_detections(tmp_path):
     assert (own["frame_id"], own["kind"], own["target_id"]) == (frames[1], "pixel", targets[0])
     assert (own["u_px"], own["v_px"]) == (12.25, 7.0)
     assert (folder / "images" / "extra.png").is_file()
-
-
-@pytest.mark.slow
-def test_half_open_links_take_few_threads_and_a_click_is_still_served(tmp_path):
-    session = open_session(write_images(tmp_path / "images", "a.png"))
-    with serving(session) as server:
-        before = threading.active_count()
-        links = []
-        try:
-            for number in range(100):
-                link = socket.create_connection(("127.0.0.1", server.server_port), timeout=5)
-                # Every other one begins a header and does not end it.
-                link.sendall(b"GET / HTTP/1.1\r\nHost: x\r\n" if number % 2 else b"")
-                links.append(link)
-            began = time.monotonic()
-            status, _, _ = ask(
-                server, "POST", f"/{server.token}/clicks",
-                {"image": 0, "revision": 0, "points": [["buoy", 1.0, 2.0]]},
-            )  # fmt: skip
-            assert status == 200 and time.monotonic() - began < 2.0
-            assert threading.active_count() - before <= MOST_LINKS
-            assert "buoy" in session.table.read_text()
-            # None of them is kept for long.
-            until = time.monotonic() + HEADER_S + 2.0
-            while threading.active_count() > before and time.monotonic() < until:
-                time.sleep(0.05)
-            assert threading.active_count() <= before
-        finally:
-            for link in links:
-                link.close()
 
 
 def test_only_who_knows_the_address_is_answered(images, serve):

@@ -45,12 +45,7 @@ class Commands(click.Group):
             raise click.UsageError(f"{error.message} Did you mean {near[0]!r}?", ctx) from error
 
 
-def _today(name: str) -> str:
-    """What an option is called; ``--into`` was its name for whatever is written."""
-    return "out" if name == "into" else name
-
-
-SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 100, "token_normalize_func": _today}
+SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 
 
 @click.group(cls=Commands, context_settings=SETTINGS)

@@ -56,29 +56,22 @@ def examine(root: Path | None = paths.ROOT) -> list[Finding]:
         In the order in which they should be mended.
     """
     if root is None:
-        return [
-            check_python(),
-            check_environment(None),
-            check_requirements(metadata.requires("wildlab") or []),
-            check_tested_versions(paths.LOCK),
-            check_resources(paths.RESOURCES),
-            check_kernel(),
-            check_reports_folder(paths.REPORTS.absolute()),
-            check_disk(Path.cwd()),
-            check_mirror(),
-        ]
+        wishes = metadata.requires("wildlab") or []
+        packages = [check_requirements(wishes), check_tested_versions(paths.LOCK)]
+    else:
+        lock = root / "environment.lock"
+        packages = [check_packages(lock), check_lock(lock, root / "pyproject.toml")]
     return [
         check_python(),
         check_environment(root),
-        check_packages(root / "environment.lock"),
-        check_lock(root / "environment.lock", root / "pyproject.toml"),
-        check_resources(root),
+        *packages,
+        check_resources(root or paths.RESOURCES),
         check_kernel(),
-        check_reports_folder(root / "reports"),
-        check_disk(root),
-        check_git(root),
+        check_reports_folder(root / "reports" if root else paths.REPORTS.absolute()),
+        check_disk(root or Path.cwd()),
+        *([check_git(root)] if root else []),
         check_mirror(),
-        check_browser(),
+        *([check_browser()] if root else []),
     ]
 
 

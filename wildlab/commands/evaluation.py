@@ -193,11 +193,10 @@ def track(
 
 @click.command()
 @click.argument("folder", metavar="DIR", type=FOLDER)
-@click.option("--html", is_flag=True, hidden=True)  # the page was not written without it
 @click.option("--images", type=ANY, help="Its images, or a video.  [default: images in the flight]")
 @shared.source
 @shared.out(FOLDER, "The folder to write to.  [default: the report, or reports/NAME-replay]")
-def replay(folder: Path, html: bool, images: Path | None, source: str | None, out: Path | None) -> None:
+def replay(folder: Path, images: Path | None, source: str | None, out: Path | None) -> None:
     """Play DIR back, a flight or a report made from one.
 
     Writes replay.html, for any browser, and replay.rrd, for rerun's viewer. They show the aircraft, what its
@@ -215,8 +214,6 @@ def replay(folder: Path, html: bool, images: Path | None, source: str | None, ou
     """
     from wildlab.runner.replay import replay as write_replay
 
-    if html:
-        click.echo("replay.html is always written now: --html is not needed.", err=True)
     written, scene = write_replay(folder, into=out, images=images, source=source, console=terminal_console())
     for clause in scene.lacks:
         click.echo(stopped(f"Not shown: {clause}"), err=True)

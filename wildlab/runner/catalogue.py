@@ -20,18 +20,15 @@
     steps = 60
     [static-point.first_look]            # what a first look takes less of than the study, besides `seeds`,
     steps = 10                           # of which it takes FIRST_LOOK_SEEDS
-    [static-point.missing]               # published numbers not reproduced yet: subject or name -> reason
-    observer = "it follows with the navigation filters"
 """
 
 from __future__ import annotations
 
 import ast
 import difflib
-import os
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -75,7 +72,6 @@ class StudyEntry(BaseModel):
     timeout_minutes: float = Field(default=30.0, gt=0, allow_inf_nan=False)
     parameters: dict[str, Any] = Field(default_factory=dict)
     first_look: dict[str, int] = Field(default_factory=dict)
-    missing: dict[str, str] = Field(default_factory=dict)
 
     @property
     def kind(self) -> str:
@@ -185,34 +181,6 @@ def find_study(name: str, studies: dict[str, StudyEntry]) -> StudyEntry:
     words = " or ".join(repr(known) for known in near)
     raise WildlabError(
         f"there is no study {name!r}", f"did you mean {words}?" if near else "see: wildlab list"
-    )
-
-
-def plain_parameters(parameters: Mapping[str, Any]) -> dict[str, Any]:
-    """Parameters as a cell of a notebook can say them: str, int, float, bool, None, and lists of these.
-
-    Raises
-    ------
-    WildlabError
-        If one is something else.
-    """
-    return {name: _plain(value, name) for name, value in parameters.items()}
-
-
-def _plain(value: Any, name: str) -> Any:
-    import numpy as np  # which listing studies does not need
-
-    if isinstance(value, os.PathLike):
-        return os.fspath(value)
-    if isinstance(value, np.generic | np.ndarray):
-        value = value.tolist()
-    if isinstance(value, list | tuple):
-        return [_plain(entry, name) for entry in value]
-    if value is None or isinstance(value, str | bool | int | float):
-        return value
-    raise WildlabError(
-        f"the parameter {name!r} is of type {type(value).__name__}",
-        "give text, numbers, true/false or a list of these",
     )
 
 

@@ -28,13 +28,10 @@ from wildlab.reporting.report import Report, open_report
 from wildlab.runner import vary
 from wildlab.runner.catalogue import StudyEntry, find_study, load_studies
 from wildlab.runner.flights import flights_for
-from wildlab.runner.processes.worker_pool import WorkerPool
+from wildlab.runner.processes.worker_pool import compute_seeds
 from wildlab.runner.seeds import (
-    SeedWork,
     damaged_line,
-    failed_seeds,
     make_work,
-    missing_seeds,
     read_seed,
     set_aside,
 )
@@ -258,8 +255,11 @@ def trials_table(
     work = make_work(reports, study, case, seed, seeds, parameters)
     if damaged := set_aside(work):
         print(f"{study}: {damaged_line(damaged)}")
-    if missing := missing_seeds(work):
-        _compute(work, missing)
+    failures = compute_seeds(
+        [work], 1, lambda done, count: print(f"\r{study}: {done} of {count} seeds", end="")
+    )
+    if failures:
+        raise RunFailed(failures[study], "mend that; the seeds that are finished are kept")
     rows = {one: read_seed(work, one) for one in work.seeds}
     first = next(iter(rows.values()), None) or {}
     for one, values in rows.items():
@@ -277,17 +277,3 @@ def trials_table(
     own = {key: float(value) for key, value in drawn.items()}
     tables = [own, *(split_keys(values) for values in rows.values() if values is not None)]
     return pd.DataFrame(tables, index=pd.Index([seed, *work.seeds], name="seed"))
-
-
-def _compute(work: SeedWork, missing: Sequence[int]) -> None:
-    failures: list[tuple[int, str]] = []
-    with WorkerPool() as pool:
-        for done, one in enumerate(missing):
-            print(f"\r{work.study}: {done} of {len(missing)} seeds", end="", flush=True)
-            pool.submit(work, one)
-            while not (results := pool.collect(wait_s=0.25)):
-                pass
-            failures += [(result.seed, result.failure.reason) for result in results if result.failure]
-    print(f"\r{work.study}: {len(missing) - len(failures)} of {len(missing)} seeds", flush=True)
-    if failures:
-        raise RunFailed(failed_seeds(failures), "mend that; the seeds that are finished are kept")

@@ -32,7 +32,6 @@ from wildlab.runner.catalogue import (
     check_notebook,
     find_studies,
     load_studies,
-    plain_parameters,
 )
 from wildlab.runner.processes.job import Job, other_reports, typed_in_report
 from wildlab.runner.processes.progress import outcome_line, pass_line, shown
@@ -80,10 +79,10 @@ def make_job(
     Raises
     ------
     WildlabError
-        As `check_notebook`, `plain_parameters` and `wildlab.runner.seeds.make_work`.
+        As `check_notebook` and `wildlab.runner.seeds.make_work`.
     """
     notebook = notebooks / study.notebook
-    parameters = plain_parameters(study.parameters)
+    parameters = dict(study.parameters)
     flight_name = "" if flight is None else _flight_name(flight)
     reductions = study.reductions() if first_look else {}
     if study.seeds is not None:

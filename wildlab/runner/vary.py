@@ -23,10 +23,9 @@ from wildlab.reporting.published import judge, load_claims, published_rows
 from wildlab.reporting.report import open_report
 from wildlab.reporting.text import slug
 from wildlab.runner.catalogue import StudyEntry, find_study, load_studies
-from wildlab.runner.processes.worker_pool import WorkerPool
+from wildlab.runner.processes.worker_pool import compute_seeds
 from wildlab.runner.seeds import (
     SeedWork,
-    failed_seeds,
     make_work,
     missing_seeds,
     read_seed,
@@ -109,7 +108,18 @@ def vary_study(
     for group, parameters in groups_of(load_twin(study.twin)).items():
         moves |= {(group, float(one)): dict.fromkeys(parameters, float(one)) for one in factors}
     works = {move: _work(study, case, seeds, move, given, reports) for move, given in moves.items()}
-    failures = _compute(list(works.values()), parallel, tell)
+    missing = sum(len(missing_seeds(work)) for work in works.values())
+    there = sum(len(work.seeds) for work in works.values()) - missing
+    tell(f"{len(works) - 1} moves and the twin as it is: {missing} flights to compute, {there} are there")
+
+    def progress(done: int, count: int) -> None:
+        if done % 20 == 0:
+            tell(f"{done} of {count} flights")
+
+    failures = compute_seeds(list(works.values()), parallel, progress)
+    for work in works.values():
+        if work.study not in failures:
+            sweep_seeds(work)
     moved = []
     for (group, factor), work in works.items():
         reason = failures.get(work.study, "")
@@ -194,34 +204,6 @@ def _work(
     work = make_work(reports, f"{study.name}.vary.{slug(group)}-{factor:g}", case.case, 0, seeds + 1, given)
     parameters = work.parameters | ({VARIED: factors} if factors else {})
     return replace(work, parameters=parameters, key=trial_key(case.case, parameters, work.code))
-
-
-def _compute(works: Sequence[SeedWork], parallel: int, tell: Callable[[str], None]) -> dict[str, str]:
-    """Compute what is missing; by the work's name why nothing came of those that failed."""
-    by_name = {work.study: work for work in works}
-    waiting = [(work, seed) for work in works for seed in missing_seeds(work)]
-    total, done = len(waiting), 0
-    failures: dict[str, str] = {}
-    there = sum(len(work.seeds) for work in works) - total
-    tell(f"{len(works) - 1} moves and the twin as it is: {total} flights to compute, {there} are there")
-    with WorkerPool() as pool:
-        while waiting or pool.pipes:
-            while waiting and pool.places(parallel - pool.size) > 0:
-                work, seed = waiting.pop(0)
-                if work.study in failures:
-                    done += 1  # one flight that cannot be flown is enough
-                    continue
-                pool.submit(work, seed)
-            for result in pool.collect(wait_s=0.25):
-                done += 1
-                if result.failure is not None:
-                    failures.setdefault(result.study, failed_seeds([(result.seed, result.failure.reason)]))
-                if done % 20 == 0:
-                    tell(f"{done} of {total} flights")
-    for name, work in by_name.items():
-        if name not in failures:
-            sweep_seeds(work)
-    return failures
 
 
 def _verdicts(study: StudyEntry, case: Study, work: SeedWork) -> dict[str, str]:

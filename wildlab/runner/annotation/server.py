@@ -7,16 +7,12 @@ asked for by number, never by name.
 
 from __future__ import annotations
 
-import contextlib
 import hmac
 import json
-import math
 import re
 import secrets
-import socket
 import sys
 import threading
-import time
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -33,8 +29,6 @@ from wildlab.runner.annotation.session import Session, check_points
 
 #: Bytes that a page may send at once, and how long it may take for it, s.
 MOST_SENT, PATIENCE_S = 1_000_000, 60
-#: Connections at once, and how long one may take for its header, s.
-MOST_LINKS, HEADER_S = 16, 5.0
 #: Pictures that are decoded at once: each may be large.
 AT_ONCE = 2
 #: Colour images with more pixels are sent as JPEG, which takes a twentieth of the time.
@@ -62,17 +56,11 @@ class ClickServer(ThreadingHTTPServer):
     """
 
     daemon_threads = True
-    #: Of the system's: links that come all at once wait for their turn.
-    request_queue_size = 128
 
     def __init__(self, session: Session, port: int = 0) -> None:
         self.session = session
         self.token = secrets.token_urlsafe(24)
         self.decoding = threading.BoundedSemaphore(AT_ONCE)
-        self._links = threading.BoundedSemaphore(MOST_LINKS)
-        #: Links whose header has not come yet, the oldest first, and since when.
-        self._waiting: dict[Any, float] = {}
-        self._lock = threading.Lock()
         super().__init__(("127.0.0.1", port), _Handler)
         self.hosts = frozenset(f"{name}:{self.server_port}" for name in ("127.0.0.1", "localhost"))
 
@@ -80,50 +68,6 @@ class ClickServer(ThreadingHTTPServer):
     def address(self) -> str:
         """What to open in a browser."""
         return f"http://127.0.0.1:{self.server_port}/{self.token}/"
-
-    def process_request(self, request: Any, client_address: Any) -> None:
-        """Give a link a thread of `MOST_LINKS`; where all are taken, the one ends that has waited longest."""
-        if not self._links.acquire(blocking=False):
-            self._end_waiting(most=1)
-            if not self._links.acquire(timeout=HEADER_S):
-                self.shutdown_request(request)
-                return
-        self.await_header(request)
-        try:
-            super().process_request(request, client_address)
-        except BaseException:
-            self._links.release()
-            raise
-
-    def process_request_thread(self, request: Any, client_address: Any) -> None:
-        """Serve a link, and give its place back."""
-        try:
-            super().process_request_thread(request, client_address)
-        finally:
-            self.got_header(request)
-            self._links.release()
-
-    def service_actions(self) -> None:
-        """End links whose header does not come."""
-        self._end_waiting(since=time.monotonic() - HEADER_S)
-
-    def await_header(self, request: Any) -> None:
-        """From now on a link's header is waited for."""
-        with self._lock:
-            self._waiting[request] = time.monotonic()
-
-    def got_header(self, request: Any) -> None:
-        """A link is being answered, or has ended."""
-        with self._lock:
-            self._waiting.pop(request, None)
-
-    def _end_waiting(self, most: int | None = None, since: float = math.inf) -> None:
-        with self._lock:
-            chosen = [one for one, began in self._waiting.items() if began < since][:most]
-            for one in chosen:
-                del self._waiting[one]
-                with contextlib.suppress(OSError):
-                    one.shutdown(socket.SHUT_RDWR)
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Browsers break off as they like; whatever else happens is the terminal's."""
@@ -163,15 +107,6 @@ class _Handler(BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
     server_version, sys_version = "wildlab", ""
     timeout = PATIENCE_S
-
-    def handle_one_request(self) -> None:
-        self.server.await_header(self.connection)
-        super().handle_one_request()
-
-    def parse_request(self) -> bool:
-        parsed = super().parse_request()
-        self.server.got_header(self.connection)
-        return parsed
 
     def do_GET(self) -> None:
         place = self._place()

@@ -14,6 +14,7 @@ import os
 import threading
 import time
 import traceback
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from multiprocessing import connection, parent_process
@@ -24,7 +25,7 @@ from wildlab.errors import WildlabError
 from wildlab.reporting.notebook_pages import clean_text
 from wildlab.runner.processes.ending import end_tree, start_process
 from wildlab.runner.processes.job import Failure
-from wildlab.runner.seeds import SeedWork, code_key, write_seed
+from wildlab.runner.seeds import SeedWork, code_key, failed_seeds, missing_seeds, write_seed
 
 
 class SeedResult(NamedTuple):
@@ -205,3 +206,39 @@ class WorkerPool(AbstractContextManager["WorkerPool"]):
             "the usual cause is too little memory: run with fewer --jobs" if gone else "--timeout gives more"
         )
         return SeedResult(work.study, seed, Failure(f"{reason}; {fix}.", "", ""))
+
+
+def compute_seeds(
+    works: Sequence[SeedWork], parallel: int, tell: Callable[[int, int], object]
+) -> dict[str, str]:
+    """Compute the seeds that are missing.
+
+    Parameters
+    ----------
+    parallel
+        How many processes.
+    tell
+        Called with how many seeds are done, of how many.
+
+    Returns
+    -------
+    dict
+        By the work's study why it failed: one flight that cannot be computed is enough.
+    """
+    waiting = [(work, seed) for work in works for seed in missing_seeds(work)]
+    total, done = len(waiting), 0
+    failures: dict[str, str] = {}
+    with WorkerPool() as pool:
+        while waiting or pool.pipes:
+            while waiting and pool.places(parallel - pool.size) > 0:
+                work, seed = waiting.pop(0)
+                if work.study in failures:
+                    done += 1
+                    continue
+                pool.submit(work, seed)
+            for result in pool.collect(wait_s=0.25):
+                done += 1
+                if result.failure is not None:
+                    failures.setdefault(result.study, failed_seeds([(result.seed, result.failure.reason)]))
+                tell(done, total)
+    return failures

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, replace
-from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
@@ -97,20 +96,12 @@ def _numbers(study: StudyEntry, metrics: dict[str, Any] | None, state: str, publ
     for row in published_rows(study.name, published):
         number = compared_number(row, ours, seeds, kind)
         if number.waiting:
-            number = replace(number, reason=_reason(study, row["name"], row["subject"], state))
+            absent = "" if state not in ("done", FIRST_LOOK) else "the study does not give it yet"
+            number = replace(number, reason=absent)
         elif state == FIRST_LOOK:
             number = replace(number, waiting=FIRST_LOOK)
         numbers.append(number)
     return numbers
-
-
-def _reason(study: StudyEntry, name: str, subject: str, state: str) -> str:
-    for pattern, reason in study.missing.items():
-        if any(
-            fnmatchcase(text, pattern) for text in (subject, name, f"{name}/{subject}", *subject.split("/"))
-        ):
-            return reason
-    return "" if state not in ("done", FIRST_LOOK) else "the study does not give it yet"
 
 
 def _claims(study: StudyEntry, metrics: dict[str, Any] | None, state: str, published: Path) -> list[Claim]:
