@@ -48,7 +48,7 @@ def test_every_command_shows_an_example(name):
     ("arguments", "heavy"),
     [
         (["--help"], {"numpy", "pandas", "matplotlib", "papermill", "rich", "pydantic"}),
-        (["list", "--out", "none"], {"pandas", "scipy", "matplotlib", "papermill", "rich", "pooch"}),
+        (["list", "--out", "none"], {"pandas", "scipy", "matplotlib", "papermill", "rich", "platformdirs"}),
     ],
 )
 def test_what_only_tells_imports_no_heavy_package(arguments, heavy, tmp_path):

@@ -32,6 +32,6 @@ def fetched() -> Path:
     """Where public data sets go: ``data/fetched`` of a checkout, otherwise the user's cache."""
     if ROOT is not None:
         return DATA / "fetched"
-    import pooch  # takes a while, and few commands need it
+    import platformdirs  # few commands need it
 
-    return Path(pooch.os_cache("wildlab")) / "fetched"
+    return platformdirs.user_cache_path("wildlab") / "fetched"

@@ -12,11 +12,10 @@ import sys
 from pathlib import Path
 
 from wildlab import studies
-from wildlab.studies import rules
 
 CASES = Path(__file__).resolve().parent / "cases"
 studies.__path__.append(str(CASES))
-rules.FOLDERS.append(CASES)
+studies.FOLDERS.append(CASES)
 
 
 def main() -> None:

@@ -35,14 +35,17 @@ import importlib.util
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
-
-import pandas as pd
-from numpy.typing import ArrayLike
+from typing import TYPE_CHECKING, Any
 
 from wildlab.errors import WildlabError
-from wildlab.evaluation.shares import Check
-from wildlab.studies.rules import StudyRules, load_rules, rule_files
+from wildlab.studies import rule_files
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from numpy.typing import ArrayLike
+
+    from wildlab.evaluation.shares import Check
+    from wildlab.studies.rules import StudyRules
 
 #: The parameter of `run_trial` that moves the twins.
 VARIED = "varied"
@@ -101,6 +104,8 @@ def find_case(case: str) -> Study:
     WildlabError
         If there is none.
     """
+    from wildlab.studies.rules import load_rules  # who lists the studies reads no rules
+
     if case not in case_names():
         raise WildlabError(
             f"there is no case {case!r}",

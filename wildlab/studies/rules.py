@@ -31,7 +31,6 @@ from collections.abc import Callable, Mapping, Sequence
 from fnmatch import fnmatchcase
 from functools import lru_cache, reduce
 from itertools import pairwise
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -44,13 +43,10 @@ from wildlab.evaluation.consistency import chi_square_interval, white_bound
 from wildlab.evaluation.intervals import share_interval
 from wildlab.evaluation.shares import Check, Pooled
 from wildlab.flight.files import Strict, check_model, read_toml
-from wildlab.paths import DATA
+from wildlab.studies import FOLDERS, rule_files
 
 if TYPE_CHECKING:
     from wildlab.studies.page import Facts
-
-#: Where rules lie, a file for each case.
-FOLDERS = [DATA / "studies"]
 
 _OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
     ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply, ast.Div: np.divide, ast.Pow: np.power,
@@ -306,11 +302,6 @@ def facts_functions(facts: Facts) -> Mapping[str, Callable[..., Any]]:
         "less": lambda one, other: facts.compare(one, other) == "less",
         "few": lambda one, other: facts.compare(one, other) == "few",
     }
-
-
-def rule_files() -> dict[str, Path]:
-    """The files of rules by case."""
-    return {path.stem: path for folder in FOLDERS for path in sorted(folder.glob("*.toml"))}
 
 
 @lru_cache(maxsize=64)
