@@ -53,31 +53,31 @@ def manifest_data() -> dict[str, Any]:
     return copy.deepcopy(MANIFEST)
 
 
+def small_flight(**changes: Any) -> Flight:
+    """``small_flight(clocks={"camera_offset_s": 0.5})``: the small flight, its manifest changed."""
+    t = np.arange(0.0, 10.0, 0.5)
+    nav = pd.DataFrame({"time_s": t, "north_m": 20.0 * t, "east_m": -3.0 * t, "down_m": -100.0})
+    nav = nav.assign(q_w=np.cos(0.05 * t), q_x=0.0, q_y=0.0, q_z=np.sin(0.05 * t))
+    covariance = pd.DataFrame(0.0, index=range(len(t)), columns=list(COVARIANCE_COLUMNS))
+    for i, sd in enumerate([2.0, 2.0, 3.0, 0.02, 0.02, 0.04]):
+        covariance[f"cov_{i}{i}"] = sd**2
+    tables = {
+        "frames": "frame_id,time_s\nA,1.0\nB,2.25\nC,8.0\n",
+        "detections": "detection_id,frame_id,u_px,v_px,target_id\n"
+        "1,A,10.0,20.0,buoy\n2,A,600.0,500.0,\n3,C,320.0,256.0,boat\n",
+        "truth": "target_id,time_s,north_m,east_m\n"
+        "buoy,nan,50.0,5.0\nboat,0.0,0.0,0.0\nboat,10.0,100.0,10.0\n",
+    }
+    made = {name: table(text) for name, text in tables.items()}
+    made["detections"] = made["detections"].assign(source="click", kind="pixel", plane_down_m=0.0)
+    made["truth"]["down_m"] = 0.0
+    manifest = make_manifest({**copy.deepcopy(MANIFEST), **changes})
+    return Flight(manifest, {"autopilot": pd.concat([nav, covariance], axis=1)}, made)
+
+
 @pytest.fixture
 def make_flight() -> Callable[..., Flight]:
-    """``make_flight(clocks={"camera_offset_s": 0.5})``: the small flight, its manifest changed."""
-
-    def make(**changes: Any) -> Flight:
-        t = np.arange(0.0, 10.0, 0.5)
-        nav = pd.DataFrame({"time_s": t, "north_m": 20.0 * t, "east_m": -3.0 * t, "down_m": -100.0})
-        nav = nav.assign(q_w=np.cos(0.05 * t), q_x=0.0, q_y=0.0, q_z=np.sin(0.05 * t))
-        covariance = pd.DataFrame(0.0, index=range(len(t)), columns=list(COVARIANCE_COLUMNS))
-        for i, sd in enumerate([2.0, 2.0, 3.0, 0.02, 0.02, 0.04]):
-            covariance[f"cov_{i}{i}"] = sd**2
-        tables = {
-            "frames": "frame_id,time_s\nA,1.0\nB,2.25\nC,8.0\n",
-            "detections": "detection_id,frame_id,u_px,v_px,target_id\n"
-            "1,A,10.0,20.0,buoy\n2,A,600.0,500.0,\n3,C,320.0,256.0,boat\n",
-            "truth": "target_id,time_s,north_m,east_m\n"
-            "buoy,nan,50.0,5.0\nboat,0.0,0.0,0.0\nboat,10.0,100.0,10.0\n",
-        }
-        made = {name: table(text) for name, text in tables.items()}
-        made["detections"] = made["detections"].assign(source="click", kind="pixel", plane_down_m=0.0)
-        made["truth"]["down_m"] = 0.0
-        manifest = make_manifest({**copy.deepcopy(MANIFEST), **changes})
-        return Flight(manifest, {"autopilot": pd.concat([nav, covariance], axis=1)}, made)
-
-    return make
+    return small_flight
 
 
 @dataclass

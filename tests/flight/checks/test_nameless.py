@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.flight.checks.test_sound_flights import POSES, euler
+from tests.flight.checks.test_mistakes_named import NAV, euler
 from wildlab.flight.checks import known_points
 from wildlab.flight.checks.check import check_flight, usable_for
 from wildlab.flight.checks.findings import Finding
@@ -32,7 +32,7 @@ def told(flight: Flight) -> list[Finding]:
 
 def turned(flight: Flight, change: Callable[[np.ndarray], np.ndarray]) -> Flight:
     """With other angles (N, 3), roll, pitch and yaw in degrees, in the poses."""
-    return euler(POSES, change)(flight)
+    return euler(NAV, change)(flight)
 
 
 def few(flight: Flight, count: int) -> Flight:

@@ -5,11 +5,10 @@ import pandas as pd
 import pytest
 
 from tests.analysis.survey_twin import Survey, simulate
-from wildlab.flight.checks import camera, mistakes, motion, sensors, tables
+from wildlab.flight.checks import mistakes, motion, sensors, tables
 from wildlab.flight.checks.attitude import Felt, FieldStep, felt_mistakes, field_mistakes
 from wildlab.flight.checks.mistakes import attitude_mistakes, axes_words, other_axes, place_mistakes
 from wildlab.flight.checks.sightings import sightings
-from wildlab.flight.manifest import replace_in_manifest
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.simulation.twins import simulate_twin
 
@@ -99,25 +98,6 @@ def _log(**changes: float) -> pd.DataFrame:
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
-    [
-        ({}, None),
-        ({"v_down_m_s": -1.0}, "down (or up)"),
-        ({"v_north_m_s": -1.0}, "north has"),
-        ({name: 1 / 0.514444 for name in ("v_north_m_s", "v_east_m_s", "v_down_m_s")}, "in kn"),
-    ],
-)
-def test_displacement_against_velocity(make_flight, changes, said):
-    flight = make_flight()
-    flight.tables["gnss"] = _log(**changes)
-    flight.nav.clear()
-    found = list(motion.motion(flight))
-    assert (said is None) == (found == [])
-    if said is not None:
-        assert found[0].level == "problem" and said in found[0].sentence
-
-
-@pytest.mark.parametrize(
     ("table", "column", "value"),
     [("imu", "w_x_rad_s", 500.0), ("imu", "f_z_m_s2", -9810.0), ("gnss", "v_east_m_s", 2000.0)],
 )
@@ -131,24 +111,6 @@ def test_beyond_bounds_is_a_problem_with_row_and_value(make_flight, table, colum
     (found,) = tables.bounds(flight)
     assert (found.level, found.table, found.field) == ("problem", table, column)
     assert f"row 7 with {value:g}" in found.sentence
-
-
-@pytest.mark.parametrize(
-    ("changes", "said"),
-    [
-        ({}, None),
-        ({"fx_px": 19.0, "fy_px": 19.0}, "millimetres"),
-        ({"cx_px": 256.0, "cy_px": 320.0}, "cx and cy"),
-        ({"cx_px": 640.0, "cy_px": 512.0, "width_px": 1280, "height_px": 1024}, None),
-        ({"cx_px": 160.0, "cy_px": 128.0}, "times as large"),
-    ],
-)
-def test_numbers_of_a_camera(make_flight, changes, said):
-    flight = make_flight()
-    flight.manifest = replace_in_manifest(flight.manifest, {"camera": changes})
-    found = list(camera.lens(flight))
-    assert (said is None) == (found == [])
-    assert said is None or said in found[0].sentence
 
 
 def test_a_degree_of_latitude_turns_level_by_a_degree():
@@ -173,17 +135,6 @@ def test_whole_hours_between_stamps_are_a_zone(make_flight):
     assert found.table == "frames" and "2 h late" in found.sentence
     flight.tables["frames"]["time_s"] += 400.0  # no whole quarter of an hour
     assert list(tables.stamps(flight)) == []
-
-
-def test_ground_heights_against_the_truth(make_flight):
-    flight = make_flight()
-    rows = pd.concat([flight.tables["detections"]] * 4, ignore_index=True)
-    rows["target_id"] = "buoy"
-    flight.tables["detections"] = rows
-    assert [one for one in camera.ground(flight) if one.field == "plane_down_m"] == []
-    flight.tables["detections"] = rows.assign(plane_down_m=-45.0)
-    (found,) = [one for one in camera.ground(flight) if one.field == "plane_down_m"]
-    assert "45 m above" in found.sentence
 
 
 def test_a_target_seen_beside_its_truth():

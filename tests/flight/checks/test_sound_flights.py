@@ -1,20 +1,17 @@
 """Sound flights are accused of nothing, and a mistake made in one is named, alone."""
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from tests.flight.checks.test_mistakes_named import NAV, euler, shift
 from tests.sound_flights import simulate_sound_flight, sound_flights
 from wildlab.flight.checks.attitude import Felt, heading_error
 from wildlab.flight.checks.check import find
-from wildlab.flight.checks.findings import QUATERNION, Finding
-from wildlab.flight.checks.mistakes import Correction, change_columns, state
+from wildlab.flight.checks.findings import Finding
+from wildlab.flight.checks.mistakes import state
 from wildlab.flight.store import Flight
 from wildlab.simulation.twins import simulate_twin
-
-POSES = "nav/autopilot"
 
 
 def turning(
@@ -38,21 +35,6 @@ def turning(
     R = (true * Rotation.from_rotvec(rng.normal(0, np.radians(1.5), force.shape))).as_matrix()
     a = acceleration(t - late_s) + rng.normal(0, 0.1, force.shape)
     return Felt(R[:-1], R[1:], np.diff(t), 0 * force[1:], force, R, a, t)
-
-
-def shift(table: str, seconds: float) -> Correction:
-    return change_columns(table, ["time_s"], lambda t: t + seconds)
-
-
-def euler(table: str, change: Callable[[np.ndarray], np.ndarray]) -> Correction:
-    """Roll, pitch, yaw (degrees, (N, 3)) as a wrong recipe would have read them."""
-
-    def turned(q: np.ndarray) -> np.ndarray:
-        angles = Rotation.from_quat(q, scalar_first=True).as_euler("ZYX", degrees=True)[:, ::-1]
-        read = Rotation.from_euler("ZYX", change(angles)[:, ::-1], degrees=True)
-        return np.asarray(read.as_quat(scalar_first=True, canonical=True))
-
-    return change_columns(table, QUATERNION, turned)
 
 
 #: Those that fly sideways, look straight down along their course, or have a camera's attitude beside an
@@ -91,9 +73,9 @@ def focal_length(flight: Flight) -> Flight:
 @pytest.mark.parametrize(
     ("kind", "mistake", "cause"),
     [
-        ("fixed wing", shift(POSES, 18.0), "clock of the receiver"),
+        ("fixed wing", shift(NAV, 18.0), "clock of the receiver"),
         ("fixed wing", focal_length, "focal length a thousandth"),
-        ("multirotor", euler(POSES, lambda e: e[:, [1, 0, 2]]), "attitude: roll and pitch exchanged"),
+        ("multirotor", euler(NAV, lambda e: e[:, [1, 0, 2]]), "attitude: roll and pitch exchanged"),
         ("nadir", shift("frames", 18.0), "clock of the camera"),
     ],
 )
@@ -156,7 +138,7 @@ def test_a_heading_is_as_sure_as_it_says():
 
 
 def test_a_heading_from_magnetic_north_is_named():
-    magnetic = euler(POSES, lambda e: e + np.array([0, 0, 12.0]))
+    magnetic = euler(NAV, lambda e: e + np.array([0, 0, 12.0]))
     (found,) = accusations(magnetic(simulate_sound_flight("fixed wing", 3)))
     assert "heading off" in found.causes
 

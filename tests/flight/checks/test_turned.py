@@ -1,7 +1,6 @@
 """A heading that is off by some degrees is said as such, and other mistakes are still found beside it."""
 
 import re
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.flight.checks.flights import boats
 from tests.flight.checks.watching import add_sensor, level_poses, watch
 from tests.flight.conftest import table
 from wildlab.flight.checks.check import check_flight
@@ -19,39 +19,6 @@ from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import wrap
 
-Make = Callable[..., Flight]
-
-#: Where five boats are at first, and how fast they go, m and m/s, north and east.
-BOATS = {
-    "a": (150.0, -120.0, 1.0, 3.0),
-    "b": (150.0, 140.0, 1.2, -3.0),
-    "c": (320.0, -90.0, 1.0, 2.0),
-    "d": (330.0, 100.0, 1.0, -2.2),
-    "e": (60.0, 80.0, 2.0, 0.0),
-}
-
-
-def watched(make: Make, off_deg: float = 0.0, late_s: float = 0.0) -> Flight:
-    """Five moving boats and clutter in 60 looks of a radar; bearings are too large by `off_deg`, and the
-    truth has the stamps of `late_s` before."""
-    rng = np.random.default_rng(2)
-    t = np.arange(0.0, 120.0, 2.0)
-    # The way bends, or all could as well be mirrored about it.
-    aside = 60 * np.sin(t / 25)
-    truth, seen = [], []
-    for name, (north, east, v_north, v_east) in BOATS.items():
-        # Boats turn, so that no shift in time is a turn about the radar.
-        p = north + v_north * t, east + v_east * t + 15 * np.sin(t / 9 + ord(name))
-        table = pd.DataFrame({"target_id": name, "time_s": t - late_s, "north_m": p[0], "east_m": p[1]})
-        truth.append(table.assign(down_m=0.0))
-        to = p[0] - 2.0 * t, p[1] - aside
-        seen.append((np.arctan2(to[1], to[0]) + rng.normal(0, np.radians(0.4), len(t)), np.hypot(*to)))
-    seen.append((rng.uniform(-np.pi, np.pi, len(t)), 300.0 + 0 * t))
-    rows = [{"azimuth_rad": bearing + np.radians(off_deg), "range_m": r} for bearing, r in seen]
-    flight = watch(make, level_poses(t, 2.0 * t, aside), t, *rows)
-    flight.tables["truth"] = pd.concat(truth, ignore_index=True)
-    return flight
-
 
 def said(flight: Flight) -> list[Finding]:
     """What is explained by a mistake; that an angle is beyond what is possible is said beside it."""
@@ -60,26 +27,26 @@ def said(flight: Flight) -> list[Finding]:
 
 @pytest.mark.parametrize("off_deg", [-10.0, 3.0, 15.0])
 def test_a_heading_that_is_off_is_a_warning_with_the_angle_and_nothing_else(make_flight, off_deg):
-    (found,) = said(watched(make_flight, off_deg))
+    (found,) = said(boats(make_flight, off_deg))
     assert found.level == "warning" and found.causes == ("heading off",)
     turns = [float(one) for one in re.findall(r"by ([+-][\d.]+) deg", found.fix)]
     assert turns == pytest.approx([-off_deg], abs=0.3)
 
 
 def test_a_heading_that_is_right_is_no_finding(make_flight):
-    assert said(watched(make_flight)) == []
+    assert said(boats(make_flight)) == []
 
 
 @pytest.mark.parametrize("late_s", [-12.0, 30.0])
 def test_a_clock_that_is_off_is_told_from_a_heading(make_flight, late_s):
-    (found,) = said(watched(make_flight, late_s=late_s))
+    (found,) = said(boats(make_flight, late_s=late_s))
     assert found.level == "problem" and all(cause.startswith("clock of the truth") for cause in found.causes)
     assert f"truth_offset_s = {late_s:g}" in found.fix
 
 
 def test_the_clock_of_one_of_two_sensors_is_named_with_what_to_state(make_flight):
     """The other one sees all where it is: it is neither the truth nor a heading."""
-    flight = watched(make_flight)
+    flight = boats(make_flight)
     add_sensor(flight, "eye", flight.table("detections"), 0.5)
     assert said(flight) == []
     stated = replace_in_manifest(flight.manifest, {"sensors": {"radar": {"clock_offset_s": 20.0}}})
@@ -89,14 +56,14 @@ def test_the_clock_of_one_of_two_sensors_is_named_with_what_to_state(make_flight
 
 
 def test_only_the_sensor_that_is_turned_is_named(make_flight):
-    flight = watched(make_flight)
-    add_sensor(flight, "horizon", watched(make_flight, 5.0).table("detections"))
+    flight = boats(make_flight)
+    add_sensor(flight, "horizon", boats(make_flight, 5.0).table("detections"))
     (found,) = said(flight)
     assert found.causes == ("heading off",) and "[sensors.horizon." in found.fix
 
 
 def test_one_look_full_of_clutter_is_no_mistake_and_hides_none(make_flight):
-    flight = watched(make_flight)
+    flight = boats(make_flight)
     detections = flight.table("detections")
     azimuth = np.random.default_rng(3).uniform(-np.pi, np.pi, 4000)
     clutter = detections.iloc[[15] * 4000].assign(azimuth_rad=azimuth, range_m=300.0)
