@@ -4,7 +4,7 @@ A receiver says how the velocity changed over a second or so, an inertial sensor
 are means over an interval. How long the specific force is does not depend on the attitude, and the receiver's
 velocity tells it too: so two clocks can be compared before anything else is known. What is wrong with units
 and axes gives an attitude that looks plausible: each is held against what knows better, gravity, the course
-over ground, the attitude of a nav source.
+over ground; the attitude of a nav source is held against them in `attitude`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
-from scipy.optimize import linear_sum_assignment
 from scipy.spatial.transform import Rotation
 
 from wildlab.flight.checks.findings import POSITION, QUATERNION, VELOCITY, Finding, Level, finite_rows, say
@@ -41,8 +40,6 @@ MOST = 3000
 STEEP = 0.7
 #: A pose further than this from a time (s) is not that of it.
 NEAREST_S = 0.3
-#: Turns further than this between two attitudes could as well be the other way round.
-TURN = 2.5
 
 
 class Inertial:
@@ -124,16 +121,6 @@ class Moves:
         return np.where(speed > SLOWEST, turned / (self.end - self.start), np.nan)
 
 
-@dataclass(frozen=True)
-class Turns:
-    """What one nav source says of intervals: start and end (K,), and the mean angular rate in b (K, 3)."""
-
-    source: str
-    start: Array
-    end: Array
-    rate: Array
-
-
 def samples(flight: Flight) -> Inertial | None:
     """The inertial samples, without those that hold no number; None where their times are of no use."""
     table = flight.imu
@@ -199,25 +186,6 @@ def airframe_sources(flight: Flight) -> list[str]:
         return along_x and (steep or (name == mount.poses and len(logs) > 1))
 
     return [name for name in logs if not of_camera(name)]
-
-
-def turns(flight: Flight) -> Iterator[Turns]:
-    """Intervals of each nav source of the airframe whose poses follow each other closely enough."""
-    for name in airframe_sources(flight):
-        nav = flight.nav[name]
-        values = finite_rows(nav, ("time_s", *QUATERNION))
-        values = values[np.abs(values[:, 1:]).sum(axis=1) > 0.5]
-        times = values[:, 0]
-        if len(times) < 2 or (np.diff(times) <= 0).any():
-            continue
-        first, last = intervals(times, STEP_S / 2, STEP_S)
-        if len(first) == 0:
-            continue
-        q = [Rotation.from_quat(values[at, 1:], scalar_first=True) for at in (first, last)]
-        turned = (q[0].inv() * q[1]).as_rotvec()
-        clear = np.linalg.norm(turned, axis=1) < TURN
-        start, end = times[first][clear], times[last][clear]
-        yield Turns(name, start, end, turned[clear] / (end - start)[:, None])
 
 
 def attitudes_near(nav: pd.DataFrame, times: Array) -> tuple[NDArray[np.intp], Array]:
@@ -328,15 +296,14 @@ def inertial(flight: Flight) -> Iterator[Finding]:
     apart = list(_overlap(imu, table))
     yield from apart
     moved = None if any(one.level == "problem" for one in apart) else moves(table)
-    wrong = [*_force_unit(imu, moved), *_rate_unit(flight, imu, moved)]
+    wrong = [*_force_unit(imu, moved), *_rate_unit(imu, moved)]
     yield from wrong
     if any(one.field.startswith("f_") for one in wrong):
         return
     late = [] if moved is None else list(_offset(flight, imu, moved))
     yield from late
     if not wrong and not late:
-        found = list(_gravity(imu, moved)) or list(_against_attitude(flight, imu, moved))
-        yield from found or _against_course(imu, moved)
+        yield from list(_gravity(imu, moved)) or _against_course(imu, moved)
 
 
 def _gaps(table: str, times: Array, longest: float) -> Iterator[Finding]:
@@ -416,8 +383,8 @@ FASTEST = 10.0  # rad/s
 #: Turning counts from here on, flying as well.
 TURNING, SLOWEST = 0.05, 5.0  # rad/s, m/s
 ENOUGH_TURNS = 10
-#: Axes are judged where they were moved (rad/s, m/s^2), by so clear a correlation.
-MOVED_RATE, MOVED_FORCE, CLEAR = 0.02, 0.7, 0.6
+#: So clear a correlation is a sign.
+CLEAR = 0.6
 #: So closely the rate about z follows the course where the nose points where it goes.
 FOLLOWS = 0.9
 #: The mean force points within 45 deg of where it should, or away from it.
@@ -448,37 +415,21 @@ def _force_unit(imu: Inertial, moved: Moves | None) -> Iterator[Finding]:
     yield Finding("problem", "imu", "f_z_m_s2", code, facts, corrections=(correct,))
 
 
-def _rate_unit(flight: Flight, imu: Inertial, moved: Moves | None) -> Iterator[Finding]:
+def _rate_unit(imu: Inertial, moved: Moves | None) -> Iterator[Finding]:
     """Angular rate in deg/s, or taken for it."""
-
-    def wrong(code: str, ratio: float, **facts: Any) -> Finding:
-        fast = ratio > FACTOR
-        unit = np.radians(1.0) if fast else np.degrees(1.0)
-        correct: tuple[Correction, ...] = (change_columns("imu", RATE, lambda w: unit * w),)
-        certain = fast or code == "rate-against-attitude"
-        level: Level = "problem" if certain else "warning"
-        facts |= {"ratio": ratio, "fast": fast, "unit": "deg/s" if fast else "rad/s"}
-        return Finding(level, "imu", "w_z_rad_s", code, facts, corrections=correct if certain else ())
-
-    for turn in turns(flight):
-        rate = imu.mean_rate(turn.start, turn.end)
-        size = np.linalg.norm(turn.rate, axis=1)
-        good = np.isfinite(rate).all(axis=1) & (size > TURNING)
-        if good.sum() >= ENOUGH_TURNS:
-            ratio = np.median(np.linalg.norm(rate[good], axis=1) / size[good])
-            # Another unit leaves the direction as it was; another clock, or another attitude, does not.
-            if not 1 / FACTOR < ratio < FACTOR and _together(rate[good], turn.rate[good]) > CLEAR:
-                yield wrong("rate-against-attitude", ratio, source=turn.source)
-                return
     if moved is not None:
         speed = np.linalg.norm(imu.mean_rate(moved.start, moved.end), axis=1)
         course = np.abs(moved.course_rate())
         good = np.isfinite(speed) & (course > TURNING)
-        if good.sum() >= ENOUGH_TURNS:
-            ratio = np.median(speed[good] / course[good])
-            if not 1 / FACTOR <= ratio <= FACTOR:
-                yield wrong("rate-against-course", ratio)
-                return
+        ratio = np.median(speed[good] / course[good]) if good.sum() >= ENOUGH_TURNS else 1.0
+        if not 1 / FACTOR <= ratio <= FACTOR:
+            # Who flies sideways may turn less than the course does.
+            fast = ratio > FACTOR
+            facts = {"ratio": ratio, "fast": fast, "unit": "deg/s" if fast else "rad/s"}
+            correct = (change_columns("imu", RATE, np.radians),) if fast else ()
+            level: Level = "problem" if fast else "warning"
+            yield Finding(level, "imu", "w_z_rad_s", "rate-against-course", facts, corrections=correct)
+            return
     end = imu.times[imu.times >= imu.times[0] + 1.0]
     end = end[:: max(1, len(end) // SECONDS)]
     fast = np.linalg.norm(imu.mean_rate(end - 1.0, end), axis=1) if len(end) else np.zeros(1)
@@ -513,43 +464,6 @@ def _gravity(imu: Inertial, moved: Moves | None) -> Iterator[Finding]:
         if abs(about_z) > CLEAR:
             facts["hint"] = f" (here the turns say that z points {'up' if about_z < 0 else 'down'})"
     yield Finding("problem", "imu", f"f_{AXES[axis]}_m_s2", code, facts, corrections=corrections)
-
-
-def _against_attitude(flight: Flight, imu: Inertial, moved: Moves | None) -> Iterator[Finding]:
-    for turn in turns(flight):
-        rate = imu.mean_rate(turn.start, turn.end)
-        yield from _mapping("rate", rate, turn.rate, MOVED_RATE, turn.source)
-        if moved is not None:
-            rows, R = attitudes_near(flight.nav[turn.source], (moved.start + moved.end) / 2)
-            expected = np.einsum("kji,kj->ki", R, moved.force[rows])
-            felt = imu.mean_force(moved.start, moved.end)[rows]
-            yield from _mapping("force", felt, expected, MOVED_FORCE, turn.source)
-
-
-def _mapping(what: str, measured: Array, expected: Array, moved: float, source: str) -> Iterator[Finding]:
-    """Whether the axes go with those of the attitude, as they are or otherwise."""
-    good = np.isfinite(measured).all(axis=1) & np.isfinite(expected).all(axis=1)
-    if good.sum() < ENOUGH:
-        return
-    measured, expected = measured[good], expected[good]
-    lively = np.flatnonzero((expected.std(axis=0) > moved) & (measured.std(axis=0) > moved / 10))
-    if len(lively) == 0:
-        return
-    C = np.corrcoef(measured[:, lively].T, expected[:, lively].T)[: len(lively), len(lively) :]
-    mine, theirs = linear_sum_assignment(-np.abs(C))
-    best = C[mine, theirs]
-    wrong = (np.abs(best) > CLEAR) & ((mine != theirs) | (best < 0))
-    # An exchange has to be clearly better than no exchange: axes of a manoeuvre may well move together.
-    wrong &= best**2 > C[mine, mine] * np.abs(C[mine, mine]) + 0.2
-    if wrong.any():
-        pairs = [
-            f"{AXES[lively[mine[i]]]} goes with {'minus ' if best[i] < 0 else ''}{AXES[lively[theirs[i]]]}"
-            for i in np.flatnonzero(wrong)
-        ]
-        axis = AXES[lively[mine[int(np.argmax(wrong))]]]
-        field = f"w_{axis}_rad_s" if what == "rate" else f"f_{axis}_m_s2"
-        facts = {"what": what, "rates": what == "rate", "source": source, "pairs": ", ".join(pairs)}
-        yield Finding("warning", "imu", field, "axes-against-attitude", facts)
 
 
 def _together(a: Array, b: Array) -> float:
