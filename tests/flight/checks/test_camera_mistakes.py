@@ -1,6 +1,5 @@
 """Usual mistakes about pixels, calibration, mount, poses and clock, named by clicks on known points."""
 
-import re
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -10,7 +9,7 @@ import pymap3d
 import pytest
 from scipy.spatial.transform import Rotation
 
-from wildlab.flight.checks.known_points import HARD, clock_fit, clock_mistakes, judge
+from wildlab.flight.checks.known_points import judge
 from wildlab.flight.checks.sightings import SightingGeometry, Sightings
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import euler_to_matrix
@@ -133,55 +132,3 @@ def test_a_mistake_is_named(make_flight, cause):
     flight = make_flight(time={"kind": "sequence"})
     found = [one.causes for one in judge(flight, MISTAKES[cause](sightings()))]
     assert any(cause in one for one in found), found
-
-
-# -- the clock of the camera, and turns that look like it
-
-IMAGES, EACH, SPEED, OFF_M = 60, 3, 20.0, 0.5
-
-
-def flown(*, forward: bool, late: float = 0.0, off_m: float = 0.0) -> Sightings:
-    """In every direction; the wind blows the same speed from anywhere, or it flies forward."""
-    rng = np.random.default_rng(5)
-    image, n = np.arange(IMAGES * EACH) // EACH, IMAGES * EACH
-    heading = rng.uniform(-np.pi, np.pi, IMAGES)[image]
-    course = heading if forward else rng.uniform(-np.pi, np.pi, IMAGES)[image]
-    p = np.column_stack([rng.uniform(-200, 200, (n, 2)), np.full(n, -90.0)])
-    v = SPEED * np.column_stack([np.cos(course), np.sin(course), np.zeros(n)])
-    R = euler_to_matrix(np.zeros(n), np.zeros(n), heading)
-    points = np.column_stack([p[:, :2] + rng.uniform(-10, 10, (n, 2)), np.zeros(n)])
-    lens = Camera(640, 512, 700.0, 700.0, 320.0, 256.0)
-    uv = ground_to_pixel(lens, points, *camera_pose(Mount("down"), p + late * v, R))
-    points[:, :2] += rng.normal(0, off_m, (IMAGES, 2))[image]
-    return straight_down(lens, p, R, points, uv, image, [0.02, 2.0, 2.0], v)
-
-
-def test_forward_flight_alone_does_not_tell_a_clock_from_a_tilt():
-    alike, apart = clock_fit(flown(forward=True), 0.0), clock_fit(flown(forward=False), 0.0)
-    assert alike is None or alike.correlation > 0.95
-    assert apart is not None and apart.correlation < 0.3
-
-
-def test_the_interval_is_that_of_as_many_images():
-    """Each image says where it was along its course to so many metres."""
-    found = clock_fit(flown(forward=False, late=0.5, off_m=OFF_M), 0.5)
-    assert found.sd_s == pytest.approx(OFF_M / SPEED / np.sqrt(IMAGES), rel=0.3)
-
-
-@pytest.mark.parametrize("late", [0.5, -0.5])
-def test_the_advice_has_the_interval(late):
-    first = next(clock_mistakes(flown(forward=False, late=late, off_m=4 * OFF_M), 0.0))
-    low, high, alike = (float(x) for x in re.findall(r"\d\.\d+", first.said)[1:4])
-    assert low < abs(late) < high and high - low < 0.1 and alike < HARD
-
-
-def test_the_interval_of_a_clock_reaches_half_way_between_two_poses():
-    """White noise of poses is least there, and draws the offset that fits best."""
-    late = flown(forward=False, late=0.5, off_m=OFF_M)
-
-    def bounds(between):
-        said = next(clock_mistakes(replace(late, between_s=between), 0.0)).said
-        return [float(x) for x in re.findall(r"\d\.\d+", said)[1:3]]
-
-    near, far = bounds(0.0), bounds(0.5)
-    assert far == pytest.approx([near[0] - 0.25, near[1] + 0.25], abs=0.011)

@@ -1,6 +1,5 @@
 """`check_flight` and `usable_for` on the small flight."""
 
-import numpy as np
 import pandas as pd
 import pytest
 
@@ -11,16 +10,6 @@ from wildlab.flight.checks.check import check_flight, usable_for
 def test_the_right_flight_has_nothing_wrong(make_flight):
     found = check_flight(make_flight(clocks={"camera_offset_s": 0.01}))
     assert found == []
-
-
-@pytest.mark.parametrize("noise_m", [0.0, 0.3])
-def test_what_a_clock_is_worth_is_by_the_flights_own_speed(make_flight, noise_m):
-    flight = make_flight()
-    nav, rng = flight.nav["autopilot"], np.random.default_rng(0)
-    flight.nav["autopilot"] = nav.assign(north_m=nav["north_m"] + rng.normal(0, noise_m, len(nav)))
-    (facts,) = (one.facts for one in check_flight(flight) if one.code == "camera-clock")
-    assert facts["speed"] == pytest.approx(np.hypot(20.0, 3.0), rel=0.02)
-    assert facts["metres"] == pytest.approx(facts["speed"] / 10)
 
 
 @pytest.mark.parametrize(

@@ -248,13 +248,6 @@ def test_receivers_of_different_times_are_told_apart(make_flight):
     assert ["'b'" in one.sentence for one in found] == [False, True]
 
 
-@pytest.mark.parametrize(("begins_s", "zone"), [(900.0, True), (930.0, True), (1200.0, False)])
-def test_the_zone_is_named_near_quarters_of_an_hour(make_flight, begins_s, zone):
-    (found,) = of_truths(flown(make_flight, 2400.0), {"boat": (begins_s, 2500.0)})
-    assert ("zone" in found.fix) == zone
-    assert (f"{begins_s - 1:.1f} s after" in found.fix) != zone
-
-
 def test_truth_of_another_day_is_a_problem_that_names_the_zone(make_flight):
     found = of_truths(flown(make_flight), {"boat": (7200.0, 7300.0)})[0]
     assert found.level == "problem" and "time zone" in found.fix

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 
 from wildlab.flight.checks.attitude import field, forces, heading
 from wildlab.flight.checks.camera import ground, image, lens, terrain_findings
@@ -39,8 +37,6 @@ __all__ = ["Finding", "Use", "check_flight", "find", "sense_sentences", "usable_
 #: Parts of [uncertainty] without which a detection on the ground has no error ellipse.
 ASSUMED = ("pixel_px", "position_horizontal_m", "position_vertical_m", "tilt_deg", "heading_deg")
 LEVELS = ("problem", "warning", "note")
-#: Speeds are of ways over so many seconds.
-STEP_S = 2.0
 #: A target that is seen in fewer images or scans has no track that can be judged.
 FEWEST_SCANS = 20
 
@@ -314,18 +310,6 @@ def uncertainty(flight: Flight) -> Iterator[Finding]:
             yield Finding("note", f"nav/{name}", "cov_00", "covariance-assumed")
 
 
-def _usual_speed(flight: Flight) -> float:
-    """Median level speed, m/s, by ways of some seconds: noise of positions is no way. NaN: not known."""
-    nav = next(iter(flight.nav.values()), pd.DataFrame(columns=["time_s", "north_m", "east_m"]))
-    t, *p = nav[["time_s", "north_m", "east_m"]].dropna().sort_values("time_s").to_numpy(float).T
-    end = np.searchsorted(t, t + STEP_S)
-    begin = np.flatnonzero(end < len(t))
-    end = end[begin]
-    if not len(begin):
-        return math.nan
-    return float(np.median(np.hypot(*(one[end] - one[begin] for one in p)) / (t[end] - t[begin])))
-
-
 def clocks(flight: Flight) -> Iterator[Finding]:
     """Times, clocks, mount and heights of which nothing is stated, or what does not fit."""
     manifest, frames = flight.manifest, flight.frames
@@ -334,9 +318,7 @@ def clocks(flight: Flight) -> Iterator[Finding]:
         yield Finding("note", "flight.toml", "time.kind", "no-times")
     elif manifest.clocks.camera_offset_s == 0 and interpolated and manifest.kind == "logged":
         if manifest.camera is not None:
-            speed = _usual_speed(flight)
-            facts: dict[str, object] = {"speed": speed, "metres": speed / 10}
-            yield Finding("note", "flight.toml", "clocks.camera_offset_s", "camera-clock", facts)
+            yield Finding("note", "flight.toml", "clocks.camera_offset_s", "camera-clock")
         elif silent := _silent_sensors(flight):
             facts = {"names": [repr(name) for name in silent], "n": len(silent)}
             yield Finding("note", "flight.toml", "sensors", "sensor-clocks", facts)

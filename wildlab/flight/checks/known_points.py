@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from scipy.special import bdtrc
 
-from wildlab.flight.checks.findings import POSITION, Finding, number, phrase
+from wildlab.flight.checks.findings import POSITION, Finding, number
 from wildlab.flight.checks.mistakes import (
     ALIKE,
     FAR_BETTER,
@@ -69,10 +69,6 @@ HOURS = tuple(h for h in np.arange(-14.0, 14.25, 0.25) if h)
 LEAP_S = (18.0, -18.0, 19.0, -19.0, 37.0, -37.0)
 #: A mount is off by a few degrees and no wrong meaning; beyond the second, a turn is one of the usual ones.
 TURNED_DEG, LARGEST_TURN_DEG, ROUNDS = 5.0, 40.0, 6
-#: Over which misses are differentiated by the clock, either way, s.
-STEP_S = 0.05
-#: Beyond this correlation a clock and a turn of the camera are hard to tell apart.
-HARD = 0.7
 GOLDEN = (np.sqrt(5) - 1) / 2
 #: A lever arm is no longer than this, m.
 LONGEST_LEVER = 5.0
@@ -378,66 +374,6 @@ def _weight(size: Array) -> Array:
     return 1 / (1 + (size / (2 * max(np.median(size), 1e-9))) ** 2)
 
 
-class OffsetFit(NamedTuple):
-    """How well an offset of the clock is known: its standard deviation (s) from image to image, a turn of the
-    camera being as free, and the multiple correlation of the two, 0 to 1."""
-
-    sd_s: float
-    correlation: float
-
-
-def clock_fit(s: Sightings, by: float) -> OffsetFit | None:
-    """How well an offset of the camera's clock is known beside a turn of the camera.
-
-    Least squares of the misses about the offset, linear in it and in three small turns; what images share
-    is allowed for by taking each as one.
-
-    Parameters
-    ----------
-    s
-        The sightings as they are.
-    by
-        The offset, s.
-
-    Returns
-    -------
-    OffsetFit or None
-        None where the sightings do not determine it.
-    """
-    m, before, after = (missed(s.shifted(by + step)) for step in (0.0, -STEP_S, STEP_S))
-    rows = m.good & before.good & after.good
-    if rows.sum() < 8:
-        return None
-    e, late = m.turn[rows], (before.turn - after.turn)[rows] / (2 * STEP_S)
-    J = np.concatenate([m.across[rows], late[:, :, None]], axis=2)
-    weight = _weight(np.linalg.norm(e, axis=1))
-    A = np.einsum("nia,n,nib->ab", J, weight, J)
-    image = np.unique(s.image[rows], return_inverse=True)[1]
-    if image.max() < 5 or np.linalg.cond(A) > 1e12:
-        return None
-    C = np.linalg.inv(A)
-    left = e - J @ (C @ np.einsum("nia,n,ni->a", J, weight, e))
-    score = np.zeros((image.max() + 1, 4))
-    np.add.at(score, image, np.einsum("nia,n,ni->na", J, weight, left))
-    n = len(score)
-    variance = float((C @ (score.T @ score) @ C)[3, 3]) * n / (n - 4)
-    return OffsetFit(float(np.sqrt(variance)), float(np.sqrt(max(0.0, 1 - 1 / (A[3, 3] * C[3, 3])))))
-
-
-def _interval(row: Any, s: Sightings, by: float) -> str:
-    """The interval of an offset of the clock, and what it is hard to tell from; nothing if not known.
-
-    Noise of poses that is new at each of them is least half-way between two: where images come as regularly
-    as poses, the offset that fits best lies there, up to half of the time between two poses from the true.
-    """
-    found = clock_fit(s, by)
-    if found is None:
-        return ""
-    wide = 1.96 * found.sd_s + s.between_s / 2
-    facts = {"low": abs(by) - wide, "high": abs(by) + wide, "correlation": found.correlation}
-    return phrase(row["interval"], {**facts, "hard": found.correlation > HARD})
-
-
 def clock_mistakes(s: Sightings, offset_s: float) -> Iterator[Mistake[Sightings]]:
     """A constant by which the camera's clock is late or early; `offset_s` is what the manifest has."""
 
@@ -448,8 +384,7 @@ def clock_mistakes(s: Sightings, offset_s: float) -> Iterator[Mistake[Sightings]
 
     by = best_of(lambda t: _cost(s.shifted(t)), CLOCKS)
     if abs(by) > 0.05:
-        row = one_row("camera-clock")
-        yield clock(row, by, fitted=True, interval=_interval(row, s, by))
+        yield clock(one_row("camera-clock"), by, fitted=True)
     for seconds in LEAP_S:
         yield clock(one_row("leap-seconds"), seconds)
     for hours in HOURS:
@@ -521,8 +456,7 @@ def _nameless_mistakes(flight: Flight, s: Sightings) -> Iterator[Mistake[Sightin
     by = best_of(lambda t: -float(shares(s.shifted(t)).min()), NAMELESS_CLOCKS)
     if flight.manifest.time.kind == "utc" and abs(by) >= 1.0:
         offset = flight.manifest.clocks.camera_offset_s + by
-        row = one_row("camera-clock-nameless")
-        yield mistake(row, lambda x: x.shifted(by), fitted=True, by=by, offset=offset)
+        yield mistake(one_row("camera-clock"), lambda x: x.shifted(by), fitted=True, by=by, offset=offset)
 
 
 # -- one photo or mark

@@ -76,8 +76,6 @@ class Sightings:
         Whether its angles are the log's.
     named
         Whether it is said of which point each is.
-    between_s
-        Time from one logged pose to the next, s.
     """
 
     source: str
@@ -97,7 +95,6 @@ class Sightings:
     frames: NDArray[np.object_]
     own_gimbal: bool = False
     named: bool = True
-    between_s: float = 0.0
 
     def take(self, rows: NDArray[np.bool_]) -> Sightings:
         """Some of the rows; the poses at other times go with them."""
@@ -189,7 +186,6 @@ def sightings(flight: Flight, source: str) -> Sightings | None:
         frames=ids.to_numpy(object),
         own_gimbal=flight.gimbal is not None or "pan_rad" in frames,
         named=named,
-        between_s=float(np.median(np.diff(nav["time_s"]))) if len(nav) > 1 else 0.0,
     )
     known = np.isfinite(at.p_nb).all(axis=1) & np.isfinite(at.R_nb).all(axis=(1, 2))
     known &= np.isfinite(at.points).all(axis=2).any(axis=0) & np.isfinite(at.pan + at.tilt)

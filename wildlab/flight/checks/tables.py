@@ -261,8 +261,6 @@ def _in_other_looks(flight: Flight, detections: pd.DataFrame) -> Iterator[Findin
 FEW_OUTSIDE = 0.02
 #: Logs that begin within so many seconds of each other, and end so, were switched on and off together.
 TOGETHER_S = 5.0
-#: Zones differ by whole quarters of an hour; so near to one (s), with logs that do not begin at once.
-QUARTER_S, NEAR_QUARTER_S = 900.0, 60.0
 #: More names, or gaps, than this are counted and not listed.
 LISTED = 5
 #: Share of the shorter that has to lie within the longer, and what it may be less while clocks are in doubt.
@@ -351,8 +349,8 @@ def _outside(table: str, runs: str, logs: list[_Log], times: Array) -> Finding:
         "late": late,
         "early": early,
     }
-    code = "times-outside-by-quarters" if _quarters(late) or _quarters(early) else "times-outside"
-    return Finding(level, table, "time_s", "times-apart" if level == "problem" else code, facts)
+    code = "times-apart" if level == "problem" else "times-outside"
+    return Finding(level, table, "time_s", code, facts)
 
 
 def _span(values: list[float]) -> str:
@@ -363,12 +361,6 @@ def _span(values: list[float]) -> str:
 def _listed(names: list[str], more: str) -> str:
     rest = f" and {len(names) - LISTED}{more}" if len(names) > LISTED else ""
     return ", ".join(names[:LISTED]) + rest
-
-
-def _quarters(seconds: float) -> bool:
-    """Whether it is near a whole number of quarters of an hour, and not near none."""
-    whole = QUARTER_S * round(seconds / QUARTER_S)
-    return whole != 0 and abs(seconds - whole) <= NEAR_QUARTER_S
 
 
 def gaps(flight: Flight) -> Iterator[Finding]:
