@@ -15,17 +15,17 @@ from pathlib import Path
 from typing import Annotated
 from urllib.request import urlopen
 
-from pydantic import Field, RootModel, field_validator
+from pydantic import Field, RootModel
 
 from wildlab.errors import WildlabError, system_error
 from wildlab.files import sha256
 from wildlab.flight.files import (
+    Below,
+    SafeName,
     Strict,
     check_model,
     did_you_mean,
     inside,
-    is_safe_name,
-    leaves_folder,
     read_regular,
     read_toml,
     regular_size,
@@ -42,18 +42,11 @@ Progress = Callable[[str, int, int], None]
 
 
 class DataFile(Strict):
-    path: str
+    path: Below
     url: Annotated[str, Field(pattern=r"^https://")]
     size: Annotated[int, Field(gt=0)]
     sha256: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
-    mirror: str
-
-    @field_validator("path", "mirror")
-    @classmethod
-    def _stays(cls, value: str) -> str:
-        if leaves_folder(value):
-            raise ValueError(f"the path {value!r} leaves its folder; name a file below it")
-        return value
+    mirror: Below
 
 
 class DataSet(Strict):
@@ -62,18 +55,6 @@ class DataSet(Strict):
     commit: str
     licence: str
     files: tuple[DataFile, ...]
-
-
-class _Catalog(RootModel[dict[str, DataSet]]):
-    @field_validator("root")
-    @classmethod
-    def _safe_names(cls, value: dict[str, DataSet]) -> dict[str, DataSet]:
-        for name in value:
-            if not is_safe_name(name):
-                raise ValueError(
-                    f"{name!r} cannot be the name of a data set; use letters, digits, - and _ only"
-                )
-        return value
 
 
 def read_catalog() -> dict[str, DataSet]:
@@ -95,7 +76,9 @@ def read_catalog() -> dict[str, DataSet]:
     True
     """
     path = DATA / "catalog.toml"
-    return check_model(_Catalog, read_toml(path, "the catalog of data sets"), path).root
+    return check_model(
+        RootModel[dict[SafeName, DataSet]], read_toml(path, "the catalog of data sets"), path
+    ).root
 
 
 def find_dataset(name: str) -> DataSet:

@@ -18,15 +18,16 @@ import typing
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import date, datetime, time
 from pathlib import Path, PurePosixPath, PureWindowsPath
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo, field_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError, ValidationInfo, field_validator
 
 from wildlab.errors import WildlabError, system_error
 
 #: What a flight, a nav source or a twin may be called: it becomes a file name on every system.
 SAFE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,99}")
-
+#: What to do about another name.
+SAFE = "use letters, digits, - and _ only, 100 at most"
 
 #: The most bytes of a TOML file that are read: a manifest has a few thousand.
 TOML_LIMIT = 4_000_000
@@ -95,6 +96,23 @@ def leaves_folder(name: str) -> bool:
         or bool(windows.drive or windows.root)
         or ".." in windows.parts
     )
+
+
+def _safe(name: str) -> str:
+    if not is_safe_name(name):
+        raise ValueError(f"{name[:40]!r} cannot be a name here; {SAFE}")
+    return name
+
+
+def _below(name: str) -> str:
+    if leaves_folder(name):
+        raise ValueError(f"the path {name!r} leaves its folder; name a file below it")
+    return name
+
+
+#: What becomes a file name on every system; a file below a folder.
+SafeName = Annotated[str, AfterValidator(_safe)]
+Below = Annotated[str, AfterValidator(_below)]
 
 
 def inside(folder: Path, name: str, *, file: Path, field: str) -> Path:
@@ -263,8 +281,10 @@ def check_model(model: type[Model], data: Any, path: Path | None) -> Model:
         # An unknown key is often a misspelt one: naming it explains a "missing" key, so it comes first.
         faults = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
         fault = faults[0]
-        problem, fix = _explain(model, fault["type"], fault["loc"], fault["msg"], fault.get("input"))
-        raise WildlabError(problem, fix, file=path, field=dotted(fault["loc"]) or None) from None
+        # Of a name that cannot be one, pydantic says which and that it is a key.
+        at = fault["loc"][:-2] if fault["loc"][-1:] == ("[key]",) else fault["loc"]
+        problem, fix = _explain(model, fault["type"], at, fault["msg"], fault.get("input"))
+        raise WildlabError(problem, fix, file=path, field=dotted(at) or None) from None
 
 
 def dotted(location: Sequence[str | int]) -> str:

@@ -10,10 +10,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
 from wildlab.errors import WildlabError
-from wildlab.flight.files import Strict, check_model, dump_toml, is_safe_name, parse_toml, read_toml
+from wildlab.flight.files import SafeName, Strict, check_model, dump_toml, parse_toml, read_toml
 from wildlab.flight.manifest_parts import (
     CameraPart,
     ClocksPart,
@@ -44,7 +44,7 @@ FILE_NAME = "flight.toml"
 class Manifest(Strict):
     """The whole of `flight.toml`."""
 
-    name: str
+    name: SafeName
     kind: Literal["logged", "twin"]
     description: str = ""
     locations: LocationsPart = LocationsPart()
@@ -69,23 +69,10 @@ class Manifest(Strict):
     #: Of the tables by file name, see `wildlab.flight.checksums`. A flight in memory has none.
     checksums: dict[str, Sha256] = Field(default_factory=dict)
 
-    @field_validator("name")
-    @classmethod
-    def _safe_name(cls, value: str) -> str:
-        if not is_safe_name(value):
-            raise ValueError(
-                f"{value!r} cannot be the name of a flight; use letters, digits, - and _ only, 100 at most, "
-                "the first a letter or digit"
-            )
-        return value
-
     @model_validator(mode="after")
     def _twin_is_a_twin(self) -> Manifest:
         if (self.kind == "twin") != (self.twin is not None):
-            raise ValueError(
-                f'kind = "{self.kind}" {"without" if self.twin is None else "with"} a [twin] part; '
-                "a twin names its parameters and seed in [twin], a logged flight has no [twin]"
-            )
+            raise ValueError('kind = "twin" and a part [twin] go together; give both or neither')
         return self
 
     def geometry_camera(self) -> Camera:
@@ -98,7 +85,7 @@ class Manifest(Strict):
         """
         c = self.camera
         if c is None:
-            fix = "add the part [camera] to flight.toml, or use the flight for navigation only"
+            fix = "add [camera] to flight.toml"
             raise WildlabError(f"the flight {self.name} has no camera", fix, field="camera")
         distortion = (c.k1, c.k2, c.p1, c.p2, c.k3)
         return Camera(c.width_px, c.height_px, c.fx_px, c.fy_px, c.cx_px, c.cy_px, c.skew_px, distortion)

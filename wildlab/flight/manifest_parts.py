@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AwareDatetime, Field, field_validator, model_validator
 
-from wildlab.flight.files import Strict, leaves_folder
+from wildlab.flight.files import Below, Strict
 
 Angle = Annotated[float, Field(ge=-360, le=360)]
 Spread = Annotated[float, Field(gt=0, le=1e6)]
@@ -70,10 +70,7 @@ class CameraPart(Strict):
     @classmethod
     def _focal_length(cls, value: float) -> float:
         if value <= 0:
-            raise ValueError(
-                f"the focal length is {value:g} px; give the calibrated focal length in pixels, above 0 "
-                "(lens focal length times image width over sensor width)"
-            )
+            raise ValueError(f"the focal length is {value:g} px; give the calibrated one, above 0")
         return value
 
 
@@ -104,7 +101,7 @@ class TimePart(Strict):
     @classmethod
     def _zone(cls, value: Any) -> Any:
         if isinstance(value, datetime) and value.tzinfo is None:
-            raise ValueError("the time has no zone; write it in UTC with a Z at the end")
+            raise ValueError("the time has no zone; end it with Z for UTC")
         return value
 
     @field_validator("epoch")
@@ -115,7 +112,7 @@ class TimePart(Strict):
     @model_validator(mode="after")
     def _needs_epoch(self) -> TimePart:
         if self.kind == "utc" and self.epoch is None:
-            raise ValueError('kind = "utc" has no epoch; add epoch, the UTC time at which time_s is 0')
+            raise ValueError('kind = "utc" has no epoch; add it')
         return self
 
 
@@ -239,18 +236,9 @@ class TwinPart(Strict):
 class SourcePart(Strict):
     """A raw file the flight was made from, by its name below the source folder."""
 
-    file: str
+    file: Below
     sha256: Sha256
     what: str = ""
-
-    @field_validator("file")
-    @classmethod
-    def _stays(cls, value: str) -> str:
-        if leaves_folder(value):
-            raise ValueError(
-                f"the path {value!r} leaves the folder it belongs to; give the name of a file below it"
-            )
-        return value
 
 
 #: Metres by the names of units that a user may state.
@@ -299,16 +287,13 @@ class TerrainSays(Strict):
     @classmethod
     def _geoid(cls, value: str | float | None) -> str | float | None:
         if isinstance(value, float) and abs(value) > 200:
-            raise ValueError(
-                f"a geoid {value:g} m above the ellipsoid; give its height there, which is between -110 "
-                "and 90 m on Earth"
-            )
+            raise ValueError(f"a geoid {value:g} m above the ellipsoid; on Earth it is between -110 and 90 m")
         return value
 
     @model_validator(mode="after")
     def _picture(self) -> Self:
         if (self.cell_m is None) != (self.corner is None):
-            raise ValueError("cell_m and corner belong together; give both, or none for a GeoTIFF")
+            raise ValueError("cell_m and corner belong together; give both or none")
         return self
 
 
@@ -333,7 +318,7 @@ class TerrainPart(Strict):
         Standard deviation of the map's heights, where it was stated.
     """
 
-    source: str
+    source: Below
     sha256: Sha256
     crs: str
     heights: Literal["ellipsoid", "flight", "geoid"]
@@ -348,10 +333,3 @@ class TerrainPart(Strict):
     error_rms_m: Annotated[float, Field(ge=0)]
     error_max_m: Annotated[float, Field(ge=0)]
     sd_m: Metres | None = None
-
-    @field_validator("source")
-    @classmethod
-    def _stays(cls, value: str) -> str:
-        if leaves_folder(value):
-            raise ValueError(f"the path {value!r} leaves its folder; give the name of the map alone")
-        return value

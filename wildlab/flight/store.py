@@ -22,7 +22,7 @@ import pyarrow.parquet
 from wildlab.errors import WildlabError
 from wildlab.flight.calibration_files import Learnt, write_calibration
 from wildlab.flight.checksums import CALIBRATION, TERRAIN, checksums_of, verify, with_checksums
-from wildlab.flight.files import flight_name, inside, is_safe_name, printable, regular_size
+from wildlab.flight.files import SAFE, flight_name, inside, is_safe_name, printable, regular_size
 from wildlab.flight.manifest import FILE_NAME, Manifest, manifest_toml, read_manifest
 from wildlab.flight.schema import NAV, TABLES, Table, conform
 from wildlab.geometry.terrain import Terrain
@@ -205,11 +205,7 @@ def load_flight(folder: Path | str) -> Flight:
         inside(folder, "nav", file=folder, field="nav")
         for path in sorted(nav_folder.glob("*.parquet")):
             if not is_safe_name(path.stem):
-                raise WildlabError(
-                    f"{path.stem!r} cannot be the name of a nav source",
-                    "rename it: letters, digits, - and _ only",
-                    file=path,
-                )
+                raise WildlabError(f"{path.stem!r} cannot name a nav source", SAFE, file=path)
             nav[path.stem] = _read(folder, f"nav/{path.name}", NAV)
     tables = {
         name: _read(folder, f"{name}.parquet", table)
@@ -295,12 +291,7 @@ def save_flight(
     nav = {}
     for source, table in flight.nav.items():
         if not is_safe_name(source):
-            raise WildlabError(
-                f"{source!r} cannot be the name of a nav source, since it becomes a file name",
-                "use letters, digits, - and _ only",
-                file=target,
-                field="nav",
-            )
+            raise WildlabError(f"{source!r} cannot name a nav source", SAFE, file=target, field="nav")
         nav[source] = conform(NAV, table, f"nav/{source}")
     tables = {}
     for name, table in flight.tables.items():

@@ -94,7 +94,7 @@ def both(*changes: Change) -> Change:
         ),
         (
             lambda raw: raw.recipe["poses"].update({"../x": raw.recipe["poses"].pop("log")}),
-            "recipe.toml, poses: name a nav",
+            "recipe.toml, poses: '../x' cannot",
         ),
         (
             in_recipe("poses.log.file", "../../etc/passwd"),

@@ -137,13 +137,13 @@ def test_magnetometer(sensors):
     [
         ("imu.force.x.unit", "m/s", "not of acceleration"),
         ("imu.rate.z.plus", "bias2", "bias2 (in [imu.rate.z.plus])"),
-        ("imu.rate.z", 'value = 0.0\nunit = "rad/s"\nplus = "bias"', "plus is added"),
+        ("imu.rate.z", 'value = 0.0\nunit = "rad/s"\nplus = "bias"', "found plus and value"),
         ("imu.force.z", None, "imu.force.z: this key"),
         ("gnss.latency_s", -1.0, "latency_s: -1.0"),
         ("gnss.velocity.north", 'column = "kn"\nunit = "kn"', "either north"),
         ("gnss.where", [{"column": "tow"}], "says nothing"),
         ("gnss.where", [{"column": "tow", "above": 99}], "6 rows"),
-        ("poses.log.position_from", "gnss", "either a position"),
+        ("poses.log.position_from", "gnss", "either position"),
     ],
 )
 def test_one_thing_wrong(sensors, dotted, value, said):

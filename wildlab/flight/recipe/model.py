@@ -10,9 +10,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import AwareDatetime, Field, ValidationInfo, field_validator, model_validator
+from pydantic import AwareDatetime, Field, model_validator
 
-from wildlab.flight.files import Strict, check_model, is_safe_name, read_toml
+from wildlab.flight.files import SafeName, Strict, check_model, read_toml
 from wildlab.flight.manifest_parts import (
     CameraPart,
     ClocksPart,
@@ -87,20 +87,8 @@ class FramesPart(Series):
     pan: Angle | None = None
     tilt: Angle | None = None
 
-    rules = (
-        (
-            lambda s: (s.id is None) == (not s.unique),
-            "frames are named by either id or unique; give one of both",
-        ),
-        (
-            lambda s: s.prefix and not s.unique,
-            "a prefix is for frames made by unique; leave it out",
-        ),
-        (
-            lambda s: len(s.given("pan", "tilt")) == 1,
-            "a gimbal has both pan and tilt; give both, one as a value if it is fixed",
-        ),
-    )
+    either = ((("id",), ("unique",)), ((), ("pan", "tilt")))
+    rules = ((lambda s: s.prefix and not s.unique, "a prefix is for unique frames; leave it out"),)
 
 
 class PixelPart(Strict):
@@ -119,18 +107,7 @@ class Ground(Ruled):
     latitude: Angle | None = None
     longitude: Angle | None = None
 
-    rules = (
-        (
-            lambda s: len(s.given("down", "height")) != 1,
-            "the ground has either down or height; give one of both",
-        ),
-        (
-            lambda s: (
-                s.given("latitude", "longitude", "down") not in ((), ("latitude", "longitude"), ("down",))
-            ),
-            "a place is a latitude and a longitude beside a height; give both, or neither",
-        ),
-    )
+    either = ((("down",), ("height",), ("latitude", "longitude", "height")),)
 
 
 class Detections(Series):
@@ -151,22 +128,24 @@ class Detections(Series):
     range: Length | None = None
     ground: Ground | None = None
 
-    rules = (
+    either = (
         (
-            lambda s: (
-                len(s.given("pixel", "position", "azimuth")) != 1
-                or (s.azimuth is None and bool(s.given("elevation", "range")))
-            ),
-            "a detection is a pixel, a position, or an azimuth with or without elevation and range; "
-            "give one of these",
+            ("pixel",),
+            ("position",),
+            ("azimuth",),
+            ("azimuth", "elevation"),
+            ("azimuth", "range"),
+            ("azimuth", "elevation", "range"),
         ),
+    )
+    rules = (
         (
             lambda s: s.counts_from == "bow" and s.azimuth is None,
             "only an azimuth counts from the bow; leave counts_from out",
         ),
         (
             lambda s: s.prefix and s.id is not None,
-            "a prefix is for detections without an id; leave it out",
+            "a prefix is for detections without id; leave it out",
         ),
     )
 
@@ -187,12 +166,7 @@ class Truth(Series):
     sd_horizontal: Length | None = None
     sd_vertical: Length | None = None
 
-    rules = (
-        (
-            lambda s: len(s.given("id", "target")) != 1,
-            "truth is named by either id (a column) or target (one name); give one of both",
-        ),
-    )
+    either = ((("id",), ("target",)),)
 
 
 class Poses(Series):
@@ -209,11 +183,8 @@ class Poses(Series):
     velocity: Velocity | None = None
     spreads: Spreads | None = None
 
+    either = ((("position",), ("position_from",)),)
     rules = (
-        (
-            lambda s: len(s.given("position", "position_from")) != 1,
-            "poses have either a position or position_from; give one of both",
-        ),
         (
             lambda s: s.position_from and s.time is None,
             "position_from is for poses over time; add the time, or give a position",
@@ -281,12 +252,12 @@ class RecipeVertical(Ruled):
     rules = (
         (
             lambda s: s.correction_m and not s.taken_off,
-            "there is a correction, and taken_off does not say which heights to take it off; "
+            "taken_off does not say which heights the correction is of; "
             "name some of poses, gnss, ground, positions, truth",
         ),
         (
             lambda s: s.correction_m and not s.note,
-            "there is a correction, and no note says why; add the note",
+            "no note says why there is a correction; add it",
         ),
     )
 
@@ -298,7 +269,7 @@ class Recipe(Strict):
     `camera_file`.
     """
 
-    name: str
+    name: SafeName
     description: str = ""
     locations: LocationsPart = LocationsPart()
     origin: OriginPart | None = None
@@ -315,10 +286,10 @@ class Recipe(Strict):
     sensors: dict[str, SensorPart] = Field(default_factory=dict)
     targets: TargetsPart = TargetsPart()
     files: dict[str, str] = Field(default_factory=dict)
-    tables: dict[str, MatlabTable] = Field(default_factory=dict)
-    logs: dict[str, LogTable] = Field(default_factory=dict)
+    tables: dict[SafeName, MatlabTable] = Field(default_factory=dict)
+    logs: dict[SafeName, LogTable] = Field(default_factory=dict)
     frames: FramesPart | None = None
-    poses: dict[str, Poses] = Field(default_factory=dict)
+    poses: dict[SafeName, Poses] = Field(default_factory=dict)
     imu: Inertial | None = None
     gnss: Satellite | None = None
     magnetometer: Magnetometer | None = None
@@ -347,26 +318,6 @@ class Recipe(Strict):
         """Whether there is a camera, here or in a file of its own."""
         return self.camera is not None or self.camera_file is not None
 
-    @field_validator("name")
-    @classmethod
-    def _safe_name(cls, value: str) -> str:
-        if not is_safe_name(value):
-            shown = repr(value if len(value) <= 40 else value[:40] + "...")
-            raise ValueError(
-                f"{shown} cannot be the name of a flight; use letters, digits, - and _ only, 100 at most, "
-                "the first a letter or digit"
-            )
-        return value
-
-    @field_validator("poses", "tables", "logs")
-    @classmethod
-    def _safe_names(cls, value: dict[str, Any], info: ValidationInfo) -> dict[str, Any]:
-        what = "nav source" if info.field_name == "poses" else "table"
-        for name in value:
-            if not is_safe_name(name):
-                raise ValueError(f"{name!r} cannot name a {what}; use letters, digits, - and _ only")
-        return value
-
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         for problem in self._contradictions():
@@ -379,66 +330,48 @@ class Recipe(Strict):
         poses = {f"poses.{name}": one for name, one in self.poses.items()}
         detections = {f"detections[{i}]": one for i, one in enumerate(self.detections)}
         for name in sorted(set(self.tables) & set(self.logs))[:1]:
-            yield f"{name!r} names a table and a log; give each its own name"
+            yield f"{name!r} names a table and a log; rename one"
         for name, one in poses.items():
             if one.position_from and self.gnss is None:
-                yield f"[{name}] takes its positions from gnss, and there is none; add the part [gnss]"
+                yield f"[{name}] takes positions from gnss; add [gnss]"
         if not poses and self.gnss is None:
-            yield "there are no poses; add a part such as [poses.autopilot], or at least [gnss]"
+            yield "there are no poses; add [poses.autopilot], or at least [gnss]"
         images = frames is not None and frames.sensor is None
         if not self.has_camera and (images or any(one.pixel for one in self.detections)):
-            yield "there are images, and no camera; add the part [camera]"
+            yield "there are images, and no camera; add [camera]"
         times = {} if frames is None else {"frames": frames.time}
         over_time: dict[str, Any] = {**self.on_board, **poses, **truth}
         times |= {name: one.time for name, one in over_time.items()}
         if self.time.kind == "utc" and frames is not None and frames.time is None:
-            yield 'time.kind is "utc" and [frames] has no time; add it, or set kind = "sequence"'
+            yield '[frames] has no time; add it, or set time.kind = "sequence"'
         for name, time in times.items():
             if self.time.kind == "sequence" and time is not None:
-                yield f'time.kind is "sequence" and [{name}] has a time; set kind = "utc"'
+                yield f'[{name}] has a time; set time.kind = "utc"'
             if time is not None and time.format == "elapsed" and self.time.epoch is None:
-                yield (
-                    f"[{name}] counts the time elapsed since an epoch, and [time] has no epoch; add the epoch"
-                )
+                yield f"[{name}] counts time from an epoch; add epoch to [time]"
         if frames is not None and (frames.where or frames.changed):
             by_row = [name for name, one in poses.items() if one.frame is None and one.time is None]
             for name in [*by_row, *(name for name, one in detections.items() if one.frame is None)]:
-                yield (
-                    f"some rows of [frames] do not count, and [{name}] belongs to them row by row; "
-                    "name the column of the frame there"
-                )
+                yield f"rows of [frames] are left out, and [{name}] goes by rows; give it frame"
         if self.mount.poses and self.mount.poses not in self.poses:
-            yield (
-                f"[mount] is said to sit on the poses {self.mount.poses!r}, and there are none of that name; "
-                f"name one of these: {', '.join(sorted(self.poses)) or 'none'}"
-            )
+            known = ", ".join(sorted(self.poses)) or "none"
+            yield f"[mount] is on the poses {self.mount.poses!r}, which are not there; name one of {known}"
         for name, one in poses.items():
             if one.time is not None and one.frame is not None:
                 yield f"[{name}] has a time and a frame; take one out"
             of_frames = frames is not None and (one.frame or one.file == frames.file)
             if one.time is None and not of_frames:
-                yield (
-                    f"[{name}] has neither a time nor a frame; add the time, or name the column of the frame"
-                )
+                yield f"[{name}] has neither time nor frame; add one of them"
             if one.time is None and one.frame is None and (one.where or one.changed):
-                yield (
-                    f"[{name}] has no time and no frame, and where and changed would tear its rows from "
-                    "those of the frames; name the column of the frame, or take them out"
-                )
+                yield f"[{name}] goes by the rows of frames, so none may be left out; give it frame"
             local = one.position is None or one.position.form != "wgs84"
             if one.attitude.yaw_from_bearing is not None and (one.time is not None or local):
-                yield (
-                    f"[{name}] has yaw_from_bearing, which is for poses of frames with latitude and "
-                    "longitude; give a yaw instead"
-                )
+                yield f"[{name}] has no frames or no latitude for yaw_from_bearing; give a yaw"
         gnss = {} if self.gnss is None else {"gnss": self.gnss}
         placed: dict[str, Any] = {**poses, **truth, **gnss, **detections}
         for name, each in placed.items():
             if each.position and each.position.form != "wgs84" and self.origin is None:
-                yield (
-                    f"[{name}] has local positions, and there is no origin; "
-                    "add [origin] with latitude_deg, longitude_deg and height_m"
-                )
+                yield f"[{name}] has local positions and no origin; add [origin]"
 
 
 def read_recipe(path: Path) -> Recipe:

@@ -11,22 +11,33 @@ from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from wildlab.errors import WildlabError
-from wildlab.flight.files import Strict, did_you_mean, leaves_folder
+from wildlab.flight.files import Below, Strict, did_you_mean
 from wildlab.flight.manifest_parts import GnssPart, ImuPart, MagnetometerPart
 from wildlab.flight.readers.autoferry import Part
 from wildlab.flight.readers.formats import FOLDERS, FORMATS
 from wildlab.flight.readers.log import PARTS
 from wildlab.flight.time_scales import find_zone
 from wildlab.flight.units import Dimension, factor
+from wildlab.names import listed
 
 
 class Ruled(Strict):
-    """A part with rules; a rule is what is so where it is broken, and ``"problem; fix"``."""
+    """A part of which one of several groups of fields is given, whole and alone.
 
+    `either` holds such groups, an empty one where none need be. A rule is what is so where it is broken, and
+    ``"problem; fix"``.
+    """
+
+    either: ClassVar[tuple[tuple[tuple[str, ...], ...], ...]] = ()
     rules: ClassVar[tuple[tuple[Callable[[Any], bool], str], ...]] = ()
 
     @model_validator(mode="after")
     def _keep_rules(self) -> Self:
+        for groups in self.either:
+            given = self.given(*dict.fromkeys(name for group in groups for name in group))
+            if set(given) not in map(set, groups):
+                ways = listed([" with ".join(group) or "none" for group in groups], "or")
+                raise ValueError(f"found {listed(given) or 'nothing'}; give either {ways}")
         for broken, message in self.rules:
             if broken(self):
                 raise ValueError(message)
@@ -34,7 +45,7 @@ class Ruled(Strict):
 
     def given(self, *names: str) -> tuple[str, ...]:
         """Those of the fields that have a value."""
-        return tuple(name for name in names if getattr(self, name) is not None)
+        return tuple(name for name in names if getattr(self, name) not in (None, ()))
 
 
 class Quantity(Ruled):
@@ -49,16 +60,7 @@ class Quantity(Ruled):
     unit: str
     negate: bool = False
 
-    rules = (
-        (
-            lambda s: len(s.given("column", "value")) != 1,
-            "a quantity has either a column or a value; name the column, or give one value for all rows",
-        ),
-        (
-            lambda s: s.plus is not None and s.column is None,
-            "plus is added to a column, and there is none; name the column",
-        ),
-    )
+    either = ((("column",), ("column", "plus"), ("value",)),)
 
 
 def _of(dimension: Dimension) -> AfterValidator:
@@ -118,12 +120,7 @@ class Stamp(Ruled):
             )
         return value
 
-    rules = (
-        (
-            lambda s: (s.column is None) == (not s.columns),
-            "a time has either a column or several columns; name one of both",
-        ),
-    )
+    either = ((("column",), ("columns",)),)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -149,19 +146,12 @@ class Position(Ruled):
     down: Length | None = None
     up: Length | None = None
 
-    rules = (
-        (
-            lambda s: not s.form,
-            "a position is latitude, longitude and height, or north, east and down, or east, north and "
-            "up; give all three of one kind and none of another",
-        ),
-    )
+    either = (tuple(FORMS.values()),)
 
     @property
     def form(self) -> str:
-        """One of `FORMS`; nothing of another mixture."""
-        given = set(self.given(*(name for form in FORMS.values() for name in form)))
-        return next((form for form, names in FORMS.items() if set(names) == given), "")
+        """One of `FORMS`."""
+        return next(form for form, names in FORMS.items() if self.given(*names) == names)
 
 
 class Velocity(Ruled):
@@ -174,18 +164,7 @@ class Velocity(Ruled):
     down: Speed | None = None
     up: Speed | None = None
 
-    rules = (
-        (
-            lambda s: (
-                s.given("north", "east", "speed", "course") not in (("north", "east"), ("speed", "course"))
-            ),
-            "a velocity has either north and east, or speed and course; give both of one kind",
-        ),
-        (
-            lambda s: len(s.given("down", "up")) != 1,
-            "a velocity has either down or up; give one of both",
-        ),
-    )
+    either = ((("north", "east"), ("speed", "course")), (("down",), ("up",)))
 
 
 class PastNadir(Strict):
@@ -225,31 +204,17 @@ class Attitude(Ruled):
     inverse: bool = False
     axes: Literal["frd-ned", "flu-enu"] = "frd-ned"
 
+    either = ((("roll", "pitch", "yaw"), ("roll", "pitch", "yaw_from_bearing"), ("quaternion", "order")),)
     rules = (
         (
-            lambda s: s.quaternion is not None and (bool(s.angles) or s.order is None),
-            "a quaternion comes with its order and without angles; "
-            'add order = "wxyz" or "xyzw", and take out the angles',
-        ),
-        (
-            lambda s: s.quaternion is None and (s.order is not None or s.inverse or not s.by_angles),
-            "an attitude is roll, pitch and one yaw, or a quaternion with its order; give all of one kind",
+            lambda s: s.inverse and s.quaternion is None,
+            "only a quaternion is inverse; leave inverse out",
         ),
         (
             lambda s: s.yaw_from_bearing is not None and s.axes != "frd-ned",
             'a bearing counts from north to east; leave axes at "frd-ned"',
         ),
     )
-
-    @property
-    def angles(self) -> tuple[str, ...]:
-        """Those of the angles that are given."""
-        return self.given("roll", "pitch", "yaw", "yaw_from_bearing")
-
-    @property
-    def by_angles(self) -> bool:
-        """Whether it is roll, pitch and one yaw."""
-        return len(self.angles) == 3 and self.angles[:2] == ("roll", "pitch")
 
 
 class Spreads(Ruled):
@@ -267,15 +232,7 @@ class Spreads(Ruled):
     pitch: Angle | None = None
     yaw: Angle | None = None
 
-    rules = (
-        (
-            lambda s: (
-                s.given("tilt", "heading", "roll", "pitch", "yaw")
-                not in (("tilt", "heading"), ("roll", "pitch", "yaw"))
-            ),
-            "spreads of an attitude are tilt and heading, or roll, pitch and yaw; give all of one kind",
-        ),
-    )
+    either = ((("tilt", "heading"), ("roll", "pitch", "yaw")),)
 
 
 # -- tables over time, and the sensors on board
@@ -383,15 +340,6 @@ class Gimbal(Series):
     tilt: Angle
 
 
-def _below(value: str) -> str:
-    if leaves_folder(value):
-        raise ValueError(f"the path {value!r} leaves its folder; name a file below the source folder")
-    return value
-
-
-Below = Annotated[str, AfterValidator(_below)]
-
-
 class MatlabTable(Ruled):
     """A table out of a MATLAB file: `fields` of equal length, or a `matrix` whose columns have names.
 
@@ -406,15 +354,7 @@ class MatlabTable(Ruled):
     columns: tuple[Name, ...] = ()
     labels: Name | None = None
 
-    rules = (
-        (
-            lambda s: (
-                bool(s.fields) == (s.matrix is not None)
-                or bool(s.columns) + (s.labels is not None) != (s.matrix is not None)
-            ),
-            "a table is made of fields, or of a matrix with columns or labels; give one of these",
-        ),
-    )
+    either = ((("fields",), ("matrix", "columns"), ("matrix", "labels")),)
 
 
 class LogTable(Strict):
