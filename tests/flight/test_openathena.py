@@ -121,6 +121,6 @@ def test_bearings_that_do_not_agree_are_refused(shared_data, tmp_path):
     recipe = tomllib.loads((RECIPES / "openathena.toml").read_text(encoding="utf-8"))
     del recipe["poses"]["logged"]["attitude"]["yaw_from_bearing"]["past_nadir"]
     (tmp_path / "recipe.toml").write_text(dump_toml(recipe), encoding="utf-8")
-    with pytest.raises(WildlabError, match=r"gives is 1\d\d deg"):
+    with pytest.raises(WildlabError, match=r"yaw is 1\d\d deg"):
         import_flight(tmp_path / "recipe.toml", source, tmp_path / "flight")
     assert not (tmp_path / "flight").exists()

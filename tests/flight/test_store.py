@@ -113,7 +113,7 @@ def test_a_link_out_of_the_folder_is_refused(make_flight, tmp_path, name):
     inside.symlink_to(outside)
     with pytest.raises(WildlabError) as caught:
         load_flight(tmp_path / "flight")
-    assert "leaves the folder" in str(caught.value)
+    assert "leaves its folder" in str(caught.value)
     assert caught.value.field == name
 
 

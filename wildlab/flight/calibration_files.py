@@ -21,9 +21,7 @@ Share = Annotated[float, Field(ge=0)]
 
 def _refuse_misfit(covariance: tuple[tuple[float, ...], ...], n: int) -> None:
     if len(covariance) != n or any(len(row) != n for row in covariance):
-        raise ValueError(
-            f"the covariance does not fit the {n} parameters; give a row and a column for each of them"
-        )
+        raise ValueError(f"the covariance does not fit {n} parameters; give it as many rows and columns")
 
 
 class BoardPart(Strict):
@@ -240,9 +238,9 @@ def refuse_other_camera(manifest: Manifest, learnt: Learnt) -> None:
         Which part differs, and how.
     """
     here, there = manifest.camera, learnt.camera
-    fix = "learn one on a flight with this camera: wildlab calibrate"
+    fix = "learn one with this camera: wildlab calibrate"
     if here is None:
-        raise WildlabError("the calibration is of a camera and this flight has none", "leave it out")
+        raise WildlabError("this flight has no camera for the calibration", "leave it out")
     for name in CameraPart.model_fields:
         one, other = getattr(here, name), getattr(there, name)
         if name == "name":
@@ -261,5 +259,5 @@ def refuse_other_camera(manifest: Manifest, learnt: Learnt) -> None:
         if not same:
             raise WildlabError(
                 f"the calibration was learnt with another mount: {name} is {other} there and {one} here",
-                "give both flights the same [mount], or learn one on a flight with this mount",
+                "give both the same [mount], or learn one with this",
             )

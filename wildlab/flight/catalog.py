@@ -180,9 +180,9 @@ def _place(folder: Path, file: DataFile) -> Path:
         if parent.exists():
             if parent.is_dir():
                 break
-            raise WildlabError("is a file where a folder is wanted", "move it away", file=parent)
+            raise WildlabError("is in the way of a folder", "move it away", file=parent)
     if place.exists() and not place.is_file():
-        raise WildlabError("is in the way of a file to be fetched", "move it away", file=place)
+        raise WildlabError("is in the way of a file", "move it away", file=place)
     return place
 
 
@@ -195,7 +195,7 @@ def _is_right(path: Path, file: DataFile) -> bool:
 
 def _read(file: DataFile, mirror: str | None) -> bytes:
     """The bytes of a file, from the mirror or the network: those that the catalog has the checksum of."""
-    fix = "try again; if it stays so, do not trust the source"
+    fix = "try again, or do not trust the source"
     where: Path | str = file.url
     if mirror:
         places = [Path(mirror) / name for name in (file.mirror, file.path, Path(file.path).name)]

@@ -87,20 +87,20 @@ def verify(folder: Path, stated: Mapping[str, str]) -> None:
     for name in sorted({*stated, *found} - {FILE_NAME, STATED}):
         if name not in found:
             raise WildlabError(
-                "this file is missing, and flight.toml has a checksum of it",
-                f"restore it, or import the flight again; {meant}",
+                "this file is missing",
+                f"restore it, or import again; {meant}",
                 file=folder / name,
             )
         if name not in stated:
             raise WildlabError(
-                "flight.toml has no checksum of this file, so it was added later",
+                "it has no checksum in flight.toml: it was added later",
                 f"move it elsewhere; {meant}",
                 file=folder / name,
             )
         if found[name] != stated[name]:
             raise WildlabError(
-                "its SHA-256 is not the one in flight.toml: it was damaged or changed since it was written",
-                f"restore it, or import the flight again; {meant}",
+                "its SHA-256 is not that in flight.toml: it was damaged or changed",
+                f"restore it, or import again; {meant}",
                 file=folder / name,
             )
 

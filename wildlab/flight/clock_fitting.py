@@ -99,7 +99,7 @@ def fit_clock(
     x, y = np.asarray(own, float), np.asarray(reference, float)
     known = np.isfinite(x) & np.isfinite(y)
     if not known.any():
-        problem = "no stamp of one clock goes with one of the other"
+        problem = "no stamps of both clocks go together"
         raise WildlabError(problem, "state the offset", field="time")
     x_0, y_0 = float(np.median(x[known])), float(np.median(y[known]))
     dx, dy = x[known] - x_0, y[known] - y_0

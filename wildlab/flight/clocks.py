@@ -133,8 +133,8 @@ def poses_at(
         return p, R, P
     if times is None:
         raise WildlabError(
-            "these poses belong to no frames, and no times are given",
-            "give times, or a nav table with a frame_id",
+            "these poses have no frames, and no times are given",
+            "give times",
             field="nav",
         )
     before, after, share = _neighbours(nav["time_s"].to_numpy(float), times, "nav", max_gap_s)
@@ -363,7 +363,7 @@ def _longest(stamps: Array, what: str, max_gap_s: float | None = None) -> float:
     if not (np.diff(stamps) > 0).all():
         raise WildlabError(
             "the timestamps do not increase",
-            "sort the rows by time and remove repeated stamps",
+            "sort the rows, and remove repeated stamps",
             file=what,
             field="time_s",
         )

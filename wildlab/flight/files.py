@@ -45,10 +45,10 @@ class Strict(BaseModel):
         annotation = cls.model_fields[str(info.field_name)].annotation
         truths = [] if _takes(annotation, bool) or _model_in(annotation) else list(_truths(value))
         if annotation in (bool, bool | None) and not isinstance(value, bool) and value is not None:
-            raise ValueError(f"{value!r} is neither true nor false; write true or false, without quotes")
+            raise ValueError(f"{value!r} is neither true nor false; write one of them")
         if truths or (isinstance(value, bool) and not _takes(annotation, bool)):
             said = str(truths[0] if truths else value).lower()
-            raise ValueError(f"{said} is no value for this key; write a number, a text or a table")
+            raise ValueError(f"{said} is no value for this key; write another")
         return value
 
 
@@ -133,8 +133,8 @@ def inside(folder: Path, name: str, *, file: Path, field: str) -> Path:
         raise unreadable(error, path, field) from None
     if not stays:
         raise WildlabError(
-            f"the path {name!r} leaves the folder it belongs to",
-            "give a name below that folder, and copy the file there if it lies elsewhere",
+            f"the path {name!r} leaves its folder",
+            "copy the file below it",
             file=file,
             field=field,
         )
@@ -218,13 +218,11 @@ def regular_size(path: Path, limit: int | None = None, field: str | None = None)
         raise unreadable(error, path, field) from None
     if not stat.S_ISREG(found.st_mode):
         kind = next((word for is_one, word in _KINDS if is_one(found.st_mode)), "something else")
-        raise WildlabError(
-            f"is {kind}, and a regular file is wanted", "check the path", file=path, field=field
-        )
+        raise WildlabError(f"is {kind} and no regular file", "check the path", file=path, field=field)
     if limit is not None and found.st_size > limit:
         raise WildlabError(
-            f"has {found.st_size:,} bytes, and {limit:,} are the most that is read of such a file",
-            "check that it is the right file",
+            f"has {found.st_size:,} bytes, more than {limit:,}",
+            "check the path",
             file=path,
             field=field,
         )
@@ -257,7 +255,7 @@ def read_regular(path: Path, limit: int, field: str | None = None) -> bytes:
     except OSError as error:
         raise unreadable(error, path, field) from None
     if len(content) > limit:
-        fix = "try again when nobody writes to it"
+        fix = "try again"
         raise WildlabError("grew while it was read", fix, file=path, field=field)
     return content
 
@@ -300,9 +298,7 @@ def _explain(
 ) -> tuple[str, str]:
     if kind == "extra_forbidden":
         known = _keys_at(model, location[:-1])
-        return "this key is not known", (
-            did_you_mean(str(location[-1]), known) if known else "take it out or check its spelling"
-        )
+        return "this key is not known", (did_you_mean(str(location[-1]), known) if known else "take it out")
     if kind == "missing":
         return "this key is missing", "add it"
     text = message.removeprefix("Value error, ").rstrip(".")

@@ -163,8 +163,8 @@ def choose_reference(
     homeless = [name for name in names if not ways[name]]
     if homeless:
         raise WildlabError(
-            f"the heights of {listed(homeless)} count from take-off, and nothing says how high that was",
-            "state the height of the take-off above sea level",
+            f"the heights of {listed(homeless)} count from take-off of unknown height",
+            "state the take-off's height above sea level",
             field="heights",
         )
     geoid = {name: _geoid(name, streams, geoid_m) for name in names}
@@ -186,8 +186,7 @@ def choose_reference(
     low = [name for name in names if "ellipsoid" not in ways[name]]
     high = [name for name in names if "sea" not in ways[name]]
     raise WildlabError(
-        f"the heights of {listed(low)} count from sea level and those of {listed(high)} from the "
-        "ellipsoid, and nothing says how far apart these are there",
+        f"the heights of {listed(low)} count from sea level, those of {listed(high)} from the ellipsoid",
         f"state the geoid's height above the ellipsoid; {NO_GRID}",
         field="heights",
     )
@@ -254,7 +253,7 @@ def _tie(
     """What leads from heights above take-off to another reference."""
     column = "height_home_m"
     if stated is not None:
-        use = HeightUse(column, stated, "counts from take-off, whose height above sea level is stated")
+        use = HeightUse(column, stated, "counts from take-off, as stated")
         return "sea", use
     home = streams[name]
     for reference in ("sea", "ellipsoid"):

@@ -211,7 +211,7 @@ def _typed(column: Column, values: pd.Series, file: Path | str) -> pd.Series:
     if len(values) and not values.map(lambda value: isinstance(value, str)).all():
         raise WildlabError(
             f"holds {wrong!r} where text is expected",
-            "write every value as text, empty where there is none",
+            "write text, empty where there is none",
             file=file,
             field=column.name,
         )

@@ -223,7 +223,7 @@ def _present(path: Path) -> None:
     try:
         regular_size(path)
     except FileNotFoundError:
-        fix = "restore it, or import the flight again"
+        fix = "restore it, or import again"
         raise WildlabError("this file is missing", fix, file=path) from None
 
 
@@ -332,16 +332,16 @@ def _refuse(target: Path, overwrite: bool) -> None:
     if there and FILE_NAME not in there:
         raise WildlabError(
             f"this folder holds other things ({there[0]}) and no flight",
-            "choose an empty or a new folder",
+            "choose an empty folder",
             file=target,
         )
     if there and not overwrite:
-        fix = "choose another folder, or overwrite it (--overwrite; in Python overwrite=True)"
-        raise WildlabError("there is a flight in this folder already", fix, file=target)
+        fix = "choose another, or overwrite it (--overwrite; in Python overwrite=True)"
+        raise WildlabError("there is a flight already", fix, file=target)
     known = {FILE_NAME, TERRAIN, CALIBRATION, *(f"{name}.parquet" for name in TABLES)}
     for name in there:
         if name not in known and not re.fullmatch(r"nav/[^/]+\.parquet", name):
-            problem = f"{name!r} is no part of a flight, and overwriting would lose it"
+            problem = f"{name!r} is no part of a flight: it would be lost"
             raise WildlabError(problem, "move it elsewhere first", file=target)
 
 

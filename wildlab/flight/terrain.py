@@ -298,8 +298,8 @@ def lay_terrain(flight: Flight, path: Path, says: TerrainSays) -> Flight:
     _refuse_elsewhere(places, positions)
     if len(above) and (above < 0).all():
         raise WildlabError(
-            f"the whole flight is below the ground of this map, {-np.median(above):.0f} m in the middle",
-            "check what the map's heights and those of the flight count from, and their units",
+            f"the whole flight is below the ground, {-np.median(above):.0f} m in the middle",
+            "check what both heights count from, and units",
             file=path,
             field="terrain.heights",
         )
@@ -393,7 +393,7 @@ def _cut_out(places: MapPlaces, positions: Array, margin: float, says: TerrainSa
     found, cells, values = elevation.window(row, column, rows, columns, every)
     if not np.isfinite(found).any():
         raise WildlabError(
-            "has no height anywhere near the flight: holes alone",
+            "has holes alone near the flight",
             "give another map",
             file=path,
             field="terrain",
@@ -418,7 +418,7 @@ def _positions(flight: Flight) -> tuple[Array, NDArray[np.bool_]]:
     known = np.isfinite(every).all(axis=1)
     if not known.any():
         raise WildlabError(
-            "the flight has no position, so that no part of a map belongs to it",
+            "the flight has no position",
             "add poses or truth",
             file=flight.folder,
             field="nav",
@@ -437,8 +437,8 @@ def _vertical(
         return "flight", -flight.manifest.vertical.correction_m
     if stated == "ellipsoid" and elevation.vertical not in ("", "ellipsoid"):
         raise WildlabError(
-            f"its heights count from {elevation.vertical!r}, as its CRS says, and not from the ellipsoid",
-            "state as heights how many metres that lies above the ellipsoid there",
+            f"its heights count from {elevation.vertical!r}, not from the ellipsoid",
+            "state as heights how far that is above the ellipsoid",
             file=elevation.path,
             field="terrain.heights",
         )
@@ -446,9 +446,8 @@ def _vertical(
         return "ellipsoid", 0.0
     if not elevation.vertical:
         raise WildlabError(
-            "does not say what its heights count from, and nobody guesses that",
-            'state heights: "ellipsoid", "flight" (what the flight\'s own counted from), or how many metres '
-            "the geoid is above the ellipsoid there",
+            "does not say what its heights count from",
+            'state heights: "ellipsoid", "flight", or how far the geoid is above the ellipsoid',
             file=elevation.path,
             field="terrain.heights",
         )
@@ -471,8 +470,8 @@ def _geoid_by_grid(elevation: ElevationMap, flight: Flight) -> float:
         pass
     if not math.isfinite(undulation):
         raise WildlabError(
-            f"its heights count from {elevation.vertical!r}, and the grid of that is not on this machine",
-            "state as heights how many metres that lies above the ellipsoid there",
+            f"its heights count from {elevation.vertical!r}, whose grid is not installed",
+            "state as heights how far that is above the ellipsoid",
             file=elevation.path,
             field="terrain.heights",
         )
@@ -506,7 +505,7 @@ def _cell_sides(places: MapPlaces, positions: Array) -> tuple[float, float]:
     sides = np.linalg.norm(p[1:] - p[0], axis=1)
     if not (np.isfinite(sides).all() and (sides > 0).all()):
         raise WildlabError(
-            "its cells have no size near the flight",
+            "its cells have no size there",
             "check its CRS",
             file=places.map.path,
             field="terrain.crs",
@@ -579,8 +578,8 @@ def _window(places: MapPlaces, extent: Extent, every: int, path: Path) -> tuple[
     rows, columns = ((far_row - row) // every * every, (far_column - column) // every * every)
     if rows < 2 * every or columns < 2 * every:
         raise WildlabError(
-            "only touches the flight's surroundings",
-            "give a map that lies under it",
+            "only touches the surroundings",
+            "give a larger map",
             file=path,
             field="terrain",
         )
@@ -612,7 +611,7 @@ def _refuse_elsewhere(
     far = far if math.isfinite(distance) else "beyond the reach of its own CRS"
     raise WildlabError(
         f"{what} over this map, whose nearest cell is {far}",
-        f"give a map of the place, or check its CRS and {also}",
+        f"give another map, or check CRS and {also}",
         file=places.map.path,
         field="terrain",
     )

@@ -88,7 +88,7 @@ def find_zone(text: str, field: str = "zone") -> tzinfo:
     except (zoneinfo.ZoneInfoNotFoundError, ValueError, OSError):
         raise WildlabError(
             f"{text[:60]!r} is not a time zone",
-            "give UTC, a name as Europe/Oslo, or an offset as +02:00",
+            "write UTC, Europe/Oslo, or +02:00",
             field=field,
         ) from None
 

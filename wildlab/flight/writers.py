@@ -72,7 +72,7 @@ class Mission:
         if any(one.shape != rows[0].shape or one.ndim != 1 for one in rows) or not len(rows[0]):
             raise WildlabError(
                 f"way points of the shapes {[one.shape for one in rows]}",
-                "give one value for each way point, and one way point at least",
+                "give one value each, and one at least",
                 field=self.name,
             )
         whole = np.isfinite(rows).all() and all(map(math.isfinite, (*self.home, self.speed)))
@@ -131,7 +131,7 @@ def mission_items(mission: Mission) -> list[Item]:
     if len(items) > MOST_ITEMS:
         raise WildlabError(
             f"{mission.name} has {len(items)} items, and autopilots take about {MOST_ITEMS}",
-            "plan with a larger height or row distance, a shorter battery, or fewer areas at a time",
+            "plan higher, wider rows, or fewer areas",
             field="way points",
         )
     return items

@@ -137,7 +137,7 @@ def test_an_empty_card_and_one_that_says_nothing(tmp_path):
             (tmp_path / "card" / name).write_bytes(b"\x00" * 100)
         with pytest.raises(WildlabError, match=problem):
             read(tmp_path / "card", zone="")
-    with pytest.raises(WildlabError, match="no such file"):
+    with pytest.raises(WildlabError, match="is not there"):
         read(tmp_path / "lost")
 
 

@@ -47,7 +47,7 @@ def both(*changes: Change) -> Change:
             in_table("photos.csv", "09:30:03Z", "09:30:01Z"),
             "photos.csv, time_s (from [frames]): not increasing",
         ),
-        (in_recipe("files", {"../secret.txt": ""}), "recipe.toml, files.file: leaves the folder"),
+        (in_recipe("files", {"../secret.txt": ""}), "recipe.toml, files.file: leaves its folder"),
         (in_table("nav.csv", "63.440200,10.4,", "0,0,"), "nav.csv, lat: both 0"),
         (
             in_table(
@@ -98,7 +98,7 @@ def both(*changes: Change) -> Change:
         ),
         (
             in_recipe("poses.log.file", "../../etc/passwd"),
-            "recipe.toml, poses.log.file: leaves the folder",
+            "recipe.toml, poses.log.file: leaves its folder",
         ),
         (
             in_recipe("poses.log.attitude", "roll = {value = 0.0, unit = 'deg'}"),
@@ -138,7 +138,7 @@ def test_a_link_out_of_the_source_folder(raw):
     (raw.folder / "secret.csv").write_text(raw.tables["nav.csv"])
     (raw.folder / "raw" / "nav.csv").unlink()
     (raw.folder / "raw" / "nav.csv").symlink_to(raw.folder / "secret.csv")
-    with pytest.raises(WildlabError, match="leaves the folder"):
+    with pytest.raises(WildlabError, match="leaves its folder"):
         import_flight(path, raw.folder / "raw", raw.into)
     assert not raw.into.exists()
 

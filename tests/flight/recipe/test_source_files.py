@@ -81,9 +81,9 @@ def angles(part: str, values: list[float], unit: str = "rad") -> np.ndarray:
     ],
 )
 def test_degrees_that_are_said_to_be_radians_are_refused_with_what_to_write(part, values):
-    with pytest.raises(WildlabError, match="no angle") as caught:
+    with pytest.raises(WildlabError, match="not in radians") as caught:
         angles(part, values)
-    assert caught.value.fix == 'write unit = "deg", if they are in degrees'
+    assert caught.value.fix == 'write unit = "deg"'
     assert caught.value.field == f"a (in [{part}])"
     assert np.allclose(angles(part, values, "deg"), np.radians(values), equal_nan=True)
 

@@ -131,14 +131,14 @@ def camera_of_images(
         except WildlabError as error:
             return None, error.problem
     if found is None:
-        return None, "no tag of theirs says the focal length in pixels"
+        return None, "no tag has the focal length in pixels"
     width, height, focal = found["width_px"], found["height_px"], found["focal_px"]
     camera = CameraPart(
         **{"name": found["camera"] or "not stated", "width_px": width, "height_px": height},
         **{"fx_px": focal, "fy_px": focal, "cx_px": (width - 1) / 2, "cy_px": (height - 1) / 2},
     )
     how = f"{width} x {height} px, focal length {focal:.0f} px ({found['how']})"
-    return camera, f"{how}; a central principal point and no distortion are assumed"
+    return camera, f"{how}; a central principal point, no distortion"
 
 
 def clock_of_images(
@@ -174,7 +174,7 @@ def clock_of_images(
     columns: dict[str, NDArray[Any]] = {} if photos is None else photos.columns
     utc, wall = (_known(columns.get(name)) for name in ("time_s", "time_log_s"))
     if photos is None or not len(utc) + len(wall):
-        return ImageClock("sequence", 0.0, "The images have no time: they are numbered in order.")
+        return ImageClock("sequence", 0.0, "The images have no time.")
     if triggers is not None and stated_offset_s is None:
         clock = _by_triggers(photos, *triggers)
         if clock is not None:
@@ -190,11 +190,11 @@ def clock_of_images(
     flown = _flown(own, others)
     quarters = None if flown is None else quarters_ahead(wall, flown)
     if quarters is None:
-        note = "The camera's wall clock states no zone and is taken for UTC: give --zone or --camera-offset."
+        note = "The camera's clock is taken for UTC: --zone or --camera-offset."
         return ImageClock("utc", 0.0, note)
     note = (
-        f"The camera's wall clock is taken to be {quarters / 4:+g} h from UTC: only so are the images of the "
-        "flight. Seconds are not known: wildlab clock estimates them."
+        f"The camera's clock is taken to be {quarters / 4:+g} h from UTC, which alone brings the images into "
+        "the flight; wildlab clock estimates seconds."
     )
     return ImageClock("utc", -quarters * QUARTER_S, note)
 
@@ -222,8 +222,8 @@ def _by_triggers(photos: Stream, name: str, triggers: Stream) -> ImageClock | No
     return ImageClock(
         "utc",
         0.0,
-        f"{len(stamps) - match.images_left} of {len(stamps)} images have the time of a trigger's record, by "
-        f"the pattern of intervals ({match.triggers_left} records are left over).",
+        f"{len(stamps) - match.images_left} of {len(stamps)} images have the time of a trigger, by the "
+        f"pattern of intervals ({match.triggers_left} left over).",
         name,
     )
 

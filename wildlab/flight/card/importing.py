@@ -100,8 +100,8 @@ def import_card(
     """
     beside = recipe_beside(into)
     if beside.exists() and not overwrite:
-        fix = "choose another folder, or replace both (--overwrite)"
-        raise WildlabError("there is a recipe beside this flight already", fix, file=beside)
+        fix = "choose another, or --overwrite"
+        raise WildlabError("there is a recipe already", fix, file=beside)
     with tempfile.TemporaryDirectory(prefix="wildlab-") as folder:
         path = Path(folder) / beside.name
         path.write_text(card.recipe, encoding="utf-8")

@@ -116,7 +116,7 @@ class Proposal:
         if not (self.own or camera or receiver or placed):
             raise WildlabError(
                 "nothing here says where a camera was",
-                "name the log of the flight (--role FILE=own), or write a recipe (data/recipes/README.md)",
+                "name its log (--role FILE=own), or write a recipe (data/recipes/README.md)",
             )
         aboard = [(one, part) for one in (self.own, camera) for part in ("poses", "gnss")]
         aboard += [(receiver, "gnss"), (images, "photos")]
@@ -149,7 +149,7 @@ class Proposal:
             because = f" ({left_out[0]})" if left_out else ""
             raise WildlabError(
                 f"nothing here says where a camera was{because}",
-                "add the log of the flight (--role FILE=own)",
+                "add its log (--role FILE=own)",
             )
         self.data = {key: self.data[key] for key in ORDER if key in self.data} | self.data
 
@@ -172,8 +172,8 @@ class Proposal:
         taken = _with_most_rows(several)
         for one in several:
             if taken is not None and one is not taken:
-                left = f"{one.item.shown} is left out: {taken.item.shown} has more rows, and a flight has one"
-                self.notes.append(f"{left} of that role ({role}).")
+                left = f"{one.item.shown} is left out: {taken.item.shown} has more rows"
+                self.notes.append(f"{left} ({role}).")
         return taken
 
     def _choose_heights(self, own: set[str]) -> HeightPlan:
@@ -181,9 +181,7 @@ class Proposal:
         wishes, streams = self.wishes, self.streams
         alone = streams and streams.keys() <= own and all(map(_above_take_off_alone, streams.values()))
         if alone and wishes.take_off_m is None:
-            self.notes.append(
-                "Heights count from the take-off, since the log has no others; --take-off states its height."
-            )
+            self.notes.append("Heights count from the take-off: --take-off states its height.")
             use = HeightUse("height_home_m", 0.0, "")
             return HeightPlan("take-off", dict.fromkeys(streams, use))
         try:
@@ -192,7 +190,7 @@ class Proposal:
             )
         except WildlabError as error:
             option = "--take-off" if "take-off" in error.problem else "--geoid"
-            fix = f"{error.fix} ({option} METRES), or leave a file out (--role FILE=nothing)"
+            fix = f"{error.fix} ({option} METRES), or leave it out (--role FILE=nothing)"
             raise WildlabError(error.problem, fix, field=option) from None
         if plan.reference == "sea" and plan.uses:
             self.notes.append(
@@ -296,8 +294,7 @@ class Proposal:
         """The images, with the poses that stand in them."""
         photos, data, wishes, own = stream_of(images, "photos"), self.data, self.wishes, self.own
         self.notes += [
-            f"The images of {one.item.shown} are left out: {images.item.shown} has more, and a flight has "
-            "those of one folder."
+            f"The images of {one.item.shown} are left out: {images.item.shown} has more."
             for one in self.by_role["images"]
             if one.item.name != images.item.name
         ]
@@ -318,10 +315,7 @@ class Proposal:
         )
         self.notes.append(clock.note)
         if records is not None and not clock.triggers and wishes.camera_offset_s is None:
-            self.notes.append(
-                f"{int(records[1].used.sum())} records of triggers fit no images for certain, and are not "
-                "used."
-            )
+            self.notes.append(f"{int(records[1].used.sum())} triggers fit no images for certain: not used.")
         id_ = "stem" if len(set(_stems(photos))) == len(photos) else "file"
         file = self._table(images, "photos", "images")
         self.logs[file] |= {"triggers": clock.triggers} if clock.triggers else {}
@@ -364,16 +358,14 @@ class Proposal:
             self.data["mount"] = own | {"looks": "forward"}
             others = [name for name in poses if name != "camera"]
             self.notes.append(
-                f"[mount] is that of the camera's own poses (--source camera); images are not used with "
-                f"{', '.join(others)}."
+                f"[mount] is on the camera's own poses (--source camera), not on {', '.join(others)}."
                 if own
-                else "The poses are those of the camera itself: its lens points along them."
+                else "The lens points along the poses."
             )
         elif "gimbal" not in self.data:
             self.data["mount"] = {"looks": "down"}
             self.notes.append(
-                "The camera is taken to look straight down, the top of its images forward: change [mount] "
-                "where that is wrong."
+                "The camera is taken to look straight down, the top of its images forward: see [mount]."
             )
 
     def _add_targets(self) -> None:
@@ -403,14 +395,14 @@ class Proposal:
         if len(left) != 1 or len(names) != 1:
             return {}
         name = names.pop()
-        said = f"The track {left[0]} is taken for what was clicked as {printable(name)}: no other is left."
+        said = f"The track {left[0]} is taken for what was clicked as {printable(name)}."
         self.notes.append(said)
         return {left[0]: name}
 
     def _add_clicks(self, images: Choice | None) -> None:
         """What was clicked in the images."""
         if images is None or "frames" not in self.data:
-            self.notes.append("The pixels are left out: there are no images that they are of.")
+            self.notes.append("The pixels are left out: they are of no images.")
             return
         frames, clicks = self.data["frames"], self.by_role["clicks"]
         level = self._level()
@@ -452,8 +444,8 @@ class Proposal:
             if len(heights) > 1 and spread > 0:
                 self._uncertain_plane(float(np.std(heights, ddof=1)))
             self.notes.append(
-                f"The ground is taken to be level at the mean of {len(heights)} surveyed points, which "
-                f"differ by {spread:.1f} m. A map does better: --terrain."
+                f"The ground is taken to be level, as {len(heights)} surveyed points within "
+                f"{spread:.1f} m have it: better a map, --terrain."
             )
             return _to_millimetres(mean)
         for key, stream in self.streams.items():
@@ -462,8 +454,7 @@ class Proposal:
             if of_home:
                 self._uncertain_plane(TAKE_OFF_SD_M)
                 self.notes.append(
-                    "The ground is taken to be level and as high as the take-off. A map does better: "
-                    "--terrain."
+                    "The ground is taken to be level, as the take-off: better a map, --terrain."
                 )
                 return _to_millimetres(float(np.median(of_home)))
         return None
@@ -495,21 +486,20 @@ class Proposal:
                     stated.append(f"position {way}")
             if stated:
                 found["note"] = (
-                    f"{' and '.join(stated).capitalize()}: median of what the receiver stated. The rest: "
-                    + found["note"]
+                    f"{' and '.join(stated).capitalize()}: as the receiver states. The rest: " + found["note"]
                 )
             said = (
-                f"Assumed, since no log states it: pixels to {found['pixel_px']:g} px, tilt to "
+                f"Assumed: pixels to {found['pixel_px']:g} px, tilt to "
                 f"{found['tilt_deg']:g} deg, heading to {found['heading_deg']:g} deg"
             )
             if "position horizontal" not in stated:
                 level, height = found["position_horizontal_m"], found["position_vertical_m"]
                 said += f", positions to {level:g} m ({height:g} m in height)"
-            said += ". [uncertainty] has them: ellipses and verdicts on consistency rest on that."
+            said += ": see [uncertainty]."
             self.data["uncertainty"] = found | self.data.get("uncertainty", {})
             self.notes.append(said)
         if "imu" in self.data:
-            self.notes.append("[imu] assumes an inertial sensor typical of autopilots.")
+            self.notes.append("[imu] assumes a typical sensor.")
 
 
 def _refuse_without_zone(choices: Sequence[Choice]) -> None:
@@ -519,9 +509,8 @@ def _refuse_without_zone(choices: Sequence[Choice]) -> None:
     for one in choices:
         if one.role == "nothing" and "without a zone" in one.why:
             raise WildlabError(
-                f"the clock of {one.item.shown} is local time, and nothing says its zone",
-                "state it, as --zone Europe/Oslo or --zone +02:00; or leave the file out, as "
-                f"--role {one.item.name}=nothing",
+                f"the clock of {one.item.shown} is local time of no stated zone",
+                f"state it, as --zone Europe/Oslo, or leave it out: --role {one.item.name}=nothing",
                 field="--zone",
             )
 
@@ -530,8 +519,8 @@ def _no_utc(choice: Choice) -> WildlabError:
     """What to state of a log that does not know UTC."""
     clock = choice.item.log.clock if choice.item.log is not None else None
     if clock is not None and "zone" in clock.base:
-        problem = f"the clock of {choice.item.shown} is local time, and nothing says its zone"
-        return WildlabError(problem, "state it, as --zone Europe/Oslo or --zone +02:00", field="--zone")
+        problem = f"the clock of {choice.item.shown} is local time of no stated zone"
+        return WildlabError(problem, "state it, as --zone Europe/Oslo", field="--zone")
     problem = f"the clock of {choice.item.shown} does not know UTC"
     return WildlabError(
         problem, "state when it stood at zero, as --start 2026-05-01T06:00:00Z", field="--start"
@@ -584,9 +573,8 @@ def stream_of(choice: Choice, part: str) -> Stream:
     stream = choice.item.part(part)
     if stream is None:
         raise WildlabError(
-            f"{choice.item.shown} is to be {choice.role!r}, and has no {PARTS_SHOWN.get(part, part)} that "
-            "can be used",
-            f"say what else it is, or leave it out: --role {choice.item.name}=nothing",
+            f"{choice.item.shown} is no {choice.role!r}: it has no {PARTS_SHOWN.get(part, part)} to use",
+            f"choose another role, or --role {choice.item.name}=nothing",
             field="--role",
         )
     return stream

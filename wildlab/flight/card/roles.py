@@ -89,7 +89,7 @@ def source_folder(paths: Sequence[Path]) -> Path:
     """
     for path in paths:
         if not path.exists():
-            raise WildlabError("there is no such file or folder", "check the name", file=path)
+            raise WildlabError("is not there", "check the name", file=path)
     if len(paths) == 1 and paths[0].is_dir():
         return paths[0]
     try:
@@ -370,7 +370,7 @@ PARTS_SHOWN = {"photos": "images", "marks": "points", "clicks": "pixels"}
 def _useless(one: CardItem) -> str:
     """Why a log without a usable place has no role."""
     if one.log is None or not one.log.parts:
-        return "it holds nothing that a flight is made of"
+        return "it holds nothing for a flight"
     reasons = [why for stream in one.log.parts.values() for why in stream.columns["why"] if why]
     common = max(set(reasons), key=reasons.count) if reasons else "it has no positions"
     return f"no row of it can be used: {common}"
@@ -391,7 +391,7 @@ def _own(open_: Sequence[CardItem], images: CardItem | None) -> tuple[CardItem |
         for one in open_:
             distance, above = _from_images(one, images)
             if _on_board(distance, above):
-                return one, f"half of the time it is within {distance:.1f} m of where the images were taken"
+                return one, f"it is mostly within {distance:.1f} m of the images"
         return None, ""
     if not open_:
         return None, ""
@@ -446,24 +446,22 @@ def _other(one: CardItem, own: CardItem | None, images: CardItem | None) -> Choi
         taken = None if images is None else span_of(images, ["photos"], ("time_s", "time_log_s"))
         apart = -_overlap(span_of(one), taken)
         if apart > ZONES_S:
-            why = (
-                f"it is of another time, or a clock is wrong: {_lasting(apart)} lie between it and the images"
-            )
+            why = f"it is of another time: {_lasting(apart)} lie between it and the images"
             return Choice(one, "nothing", why)
-        return Choice(one, "target", "the images say where the camera was, and this is another's track")
+        return Choice(one, "target", "it is another's track")
     mine, theirs = way_of(own), way_of(one)
     if theirs is None or not np.isfinite(theirs.times).any():
         return Choice(one, "nothing", "its positions have no times")
     if mine is None:
-        return Choice(one, "nothing", "the vehicle's own log has no times to compare with")
+        return Choice(one, "nothing", "the vehicle's own log has no times")
     shared = _overlap((mine.times[0], mine.times[-1]), (theirs.times[0], theirs.times[-1]))
     if shared < SHARED_S:
-        why = f"it is of another time, or a clock is wrong: {_lasting(-shared)} lie between it and the flight"
+        why = f"it is of another time: {_lasting(-shared)} lie between it and the flight"
         return Choice(one, "nothing", why)
     distance, above = _distance(mine, theirs)
     height = "" if math.isnan(above) else f" and {abs(above):.0f} m {'below' if above > 0 else 'above'}"
     if _on_board(distance, above):
-        near = f"half of the time it is within {distance:.1f} m of the vehicle's own log"
+        near = f"it is mostly within {distance:.1f} m of the vehicle's own log"
         return Choice(one, "camera" if one.part("poses") is not None else "receiver", near)
     return Choice(
         one,

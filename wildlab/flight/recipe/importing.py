@@ -99,7 +99,7 @@ def import_flight(
     recipe = read_recipe(recipe_path)
     folder = recipe_path.parent if source is None else Path(source)
     if not folder.is_dir():
-        raise WildlabError("there is no such folder to import from", "check the source folder", file=folder)
+        raise WildlabError("there is no such folder", "check it", file=folder)
     learnt = None if calibration is None else read_learnt(calibration)
     flight = _build(recipe, RawFiles(folder, recipe_path, recipe.tables, recipe.logs))
     _refuse_problems(flight, recipe, folder)
@@ -204,7 +204,7 @@ def _camera(recipe: Recipe, raw: RawFiles) -> CameraPart | None:
             rows.refuse(
                 found != found[0],
                 partial(_camera_changes, found),
-                "import the photos of each camera or zoom as a flight of their own",
+                "import each camera or zoom by itself",
                 column,
                 f"camera.{name}",
             )
@@ -279,7 +279,7 @@ def _pose_times(
         block = recipe.frames
         raise WildlabError(
             f"{strange[0]!r} is not one of the frames" + (f" of {block.file}" if block else ""),
-            "add it there, or mend its name",
+            "add or rename it",
             file=raw.folder / _file(recipe, recipe.poses[name].file),
             field=f"{recipe.poses[name].frame} (in [poses.{name}.frame])",
         )

@@ -63,10 +63,7 @@ class Group(Strict):
     def _edges_and_labels(self) -> Self:
         edges, labels = len(self.edges), len(self.labels)
         if (edges or labels) and labels != edges + 1:
-            raise ValueError(
-                f"{edges} edges make {edges + 1} groups, and there are {labels} labels; "
-                "give one label more than edges, or neither"
-            )
+            raise ValueError(f"{edges} edges make {edges + 1} groups; give as many labels, not {labels}")
         if any(b <= a for a, b in zip(self.edges, self.edges[1:], strict=False)):
             raise ValueError("the edges do not increase; put them in order")
         return self
@@ -219,7 +216,7 @@ class RecipeCamera(Strict):
     def _file(self) -> Self:
         if self.columns and self.file is None:
             column = next(iter(self.columns))
-            raise ValueError(f"{column} names a column, and there is no file; add the file, or give a number")
+            raise ValueError(f"{column} names a column; add its file, or give a number")
         return self
 
     @property

@@ -115,8 +115,7 @@ class Stamp(Ruled):
     def _known_format(cls, value: str) -> str:
         if value not in ("iso", "unix", "elapsed") and "%" not in value:
             raise ValueError(
-                f"{value!r} is not a format of times; use iso, unix, elapsed, or a pattern such as "
-                "%d.%m.%Y %H:%M:%S.%f"
+                f"{value!r} is no format of times; use iso, unix, elapsed, or one as %d.%m.%Y %H:%M:%S.%f"
             )
         return value
 
@@ -263,7 +262,7 @@ class Condition(Ruled):
     rules = (
         (
             lambda s: not s.given("equals", "differs", "above", "below"),
-            "a condition says nothing; give it equals, differs, above or below",
+            "it says nothing; give equals, differs, above or below",
         ),
     )
 
@@ -388,5 +387,5 @@ class LogTable(Strict):
                 f"{self.part!r} is no part of a log; {did_you_mean(self.part, formats[self.format])}"
             )
         if self.add_m and self.height is None:
-            raise ValueError("add_m is added to heights, and height does not say which; add height")
+            raise ValueError("add_m needs to know which heights; add height")
         return self

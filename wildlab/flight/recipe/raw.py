@@ -115,7 +115,7 @@ class RawFiles:
         except FileNotFoundError:
             raise WildlabError(
                 f"there is no such file, and [{part}] of {self.recipe.name} asks for it",
-                "check the name in the recipe, and the source folder",
+                "check its name and the source folder",
                 file=path,
                 field=f"{part}.file",
             ) from None
@@ -244,7 +244,7 @@ class RawFiles:
         if not counts.any():
             problem = f"none of the {len(table)} rows counts"
             columns_named = ", ".join([*block.changed, *(one.column for one in block.where)])
-            raise table.fail(problem, "check the conditions in where and changed", columns_named, part)
+            raise table.fail(problem, "check where and changed", columns_named, part)
         return table.rows(np.flatnonzero(counts))
 
 
@@ -271,7 +271,7 @@ def _column(table: RawTable, column: str, part: str) -> Any:
     if column not in table.header:
         fix = did_you_mean(column, table.header)
         if len(table.header) == 1:
-            fix = "the first line is read as a single name: check the separator in the recipe"
+            fix = "the first line is a single name: check the separator"
         raise table.fail("this column is missing", fix, column, part)
     if table.header.count(column) > 1:
         raise table.fail("two columns have this name", "rename one of them", column, part)
@@ -280,7 +280,7 @@ def _column(table: RawTable, column: str, part: str) -> Any:
 
 
 #: Problem and remedy.
-_EMPTY = "this cell is empty", "fill it, or take out the row"
+_EMPTY = "this cell is empty", "fill it or take the row out"
 
 
 def numbers(
@@ -322,9 +322,8 @@ def _refuse_degrees(found: Array, table: RawTable, column: str, part: str) -> No
     known = found[np.isfinite(found)]
     leaps = np.abs(np.diff(known)) > 2 * np.pi
     if part.rsplit(".", 1)[-1] in ("roll", "pitch") or np.abs(known[0]) > 2 * np.pi or leaps.any():
-        run = f"from {known.min():.4g} to {known.max():.4g}"
-        problem = f"the angles run {run}, which no angle in radians does"
-        table.refuse(beyond, problem, 'write unit = "deg", if they are in degrees', column, part)
+        problem = f"angles from {known.min():.4g} to {known.max():.4g} are not in radians"
+        table.refuse(beyond, problem, 'write unit = "deg"', column, part)
 
 
 def plain_numbers(table: RawTable, column: str, part: str, *, may_be_empty: bool = False) -> Array:
@@ -357,10 +356,10 @@ def plain_numbers(table: RawTable, column: str, part: str, *, may_be_empty: bool
         cell = table.cell(column, row)
         problem, fix = (
             "is not a finite number",
-            "mend the cell (no unit behind it), or take out the row",
+            "mend the cell, or take the row out",
         )
         if _DECIMAL_COMMA.fullmatch(cell):
-            problem, fix = "has a decimal comma", "write `decimal = ','` beside the file in the recipe"
+            problem, fix = "has a decimal comma", "write `decimal = ','` beside file"
         raise table.fail(f"{_short(cell)} {problem}", fix, column, part, row)
     return found
 
@@ -389,7 +388,7 @@ def times(table: RawTable, stamp: Stamp, part: str, zone: str | None, epoch: dat
         zoned = np.array([bool(_ZONED.fullmatch(cell)) for cell in cells])
         own = bool(zoned.all())
         if zoned.any():
-            problem = "{} has no time zone, and others in this column have"
+            problem = "{} has no time zone, and others have"
             refuse(~zoned, problem, "write all of them alike")
     pattern = "ISO8601" if stamp.format == "iso" else stamp.format
     try:
@@ -397,32 +396,30 @@ def times(table: RawTable, stamp: Stamp, part: str, zone: str | None, epoch: dat
     except ValueError as error:
         raise table.fail(f"the format {pattern!r} cannot be used ({error})", "mend it", name, part) from None
     problem = f"{{}} is not a time of the format {stamp.format!r}"
-    refuse(pd.isna(found), problem, "mend the cell, or the format in the recipe")
+    refuse(pd.isna(found), problem, "mend the cell or the format")
     if not own:
         zone = stamp.zone or zone
         if zone is None:
-            problem = f"{_short(cells[0])} has no time zone, and the recipe names none"
-            fix = 'add zone to [time], such as zone = "UTC" or "Europe/Oslo"'
+            problem = f"{_short(cells[0])} has no time zone"
+            fix = 'add zone = "UTC" or "Europe/Oslo" to [time]'
             raise table.fail(problem, fix, name, part, 0)
         found = found.tz_localize(find_zone(zone), ambiguous="NaT", nonexistent="NaT")
-        problem = f"{{}} does not exist or exists twice in {zone}, where the clocks change"
-        refuse(pd.isna(found), problem, "give the zone as an offset such as +02:00")
+        problem = f"{{}} does not exist or exists twice in {zone}"
+        refuse(pd.isna(found), problem, "write the zone as +02:00")
     return found.tz_convert(None).to_numpy("datetime64[ns]").astype(np.int64)
 
 
 def _counted(table: RawTable, stamp: Stamp, part: str, epoch: datetime | None) -> Nanoseconds:
     name = stamp.names[0]
     if len(stamp.names) > 1:
-        raise table.fail(
-            "counted times stand in one column", "name one column", " + ".join(stamp.names), part
-        )
+        raise table.fail("counted times are one column", "name it", " + ".join(stamp.names), part)
     seconds = plain_numbers(table, name, part) * factor(stamp.unit, "time")
     start = 0 if stamp.format == "unix" or epoch is None else nanoseconds(epoch)
     far = np.abs(seconds) + abs(start) / 1e9 > _LATEST_S
     table.refuse(
         far,
         lambda row: f"{_short(table.cell(name, row))} {stamp.unit} is centuries away",
-        "check the unit of the time in the recipe (s, ms or us)",
+        "check the unit (s, ms or us)",
         name,
         part,
     )
@@ -560,14 +557,14 @@ def stamped_by(images: Stream, triggers: Stream, path: Path) -> Stream:
     stamps = images.columns.get("time_log_s", images.columns.get("time_s"))
     times = triggers.columns.get("time_s")
     if stamps is None or times is None:
-        problem = "the images or the records of their triggers have no times"
+        problem = "the images or triggers have no times"
         raise WildlabError(problem, "take out triggers", file=path, field="triggers")
     of_record = np.where(triggers.used, times, np.nan)
     match = match_triggers(stamps, of_record)
     if not match.certain:
         raise WildlabError(
-            "which image belongs to which record of a trigger is not certain",
-            "take out triggers, and give camera_offset_s in [clocks]",
+            "images and triggers do not fit for certain",
+            "give camera_offset_s in [clocks] instead",
             file=path,
             field="triggers",
         )

@@ -80,7 +80,7 @@ def read_delimited(
         line = data[: _first_undecodable(data)].count(b"\n") + 1
         raise WildlabError(f"line {line} is not UTF-8 text", "save the file as UTF-8", file=path) from None
     if not lines and not (may_be_empty and any(header)):
-        raise WildlabError("there are no rows in it", "give it a line of column names and rows", file=path)
+        raise WildlabError("there are no rows in it", "add column names and rows", file=path)
     cells = {name: pa.chunked_array(chunks, pa.string()) for name, chunks in zip(header, packed, strict=True)}
     return header, cells, np.concatenate([np.empty(0, np.int64), *lines])
 
@@ -111,9 +111,9 @@ def _uneven(row: list[str], line: int, header: tuple[str, ...], path: Path) -> W
     problem = f"line {line} has {len(row)} cells, and the first line has {len(header)}"
     for name, whole, part in zip(header, row, row[1:], strict=False):
         if len(row) > len(header) and _WHOLE.fullmatch(whole) and part.isdecimal():
-            problem += f": {whole},{part} is read as two cells, and may be a number with a decimal comma"
+            problem += f": {whole},{part} is read as two cells: a decimal comma?"
             return WildlabError(problem, "write it with a decimal point", file=path, field=name)
-    return WildlabError(problem, "mend that line, or check the separator in the recipe", file=path)
+    return WildlabError(problem, "mend that line, or the separator", file=path)
 
 
 def _first_undecodable(data: bytes) -> int:
@@ -147,14 +147,12 @@ def read_matlab(path: Path, data: bytes) -> dict[str, Any]:
     """
     if data[:8] == _HDF5 or data[512:520] == _HDF5 or data[:10] == b"MATLAB 7.3":
         raise WildlabError(
-            "is a MATLAB file of version 7.3 (HDF5), which is not read",
-            "load it in MATLAB and save it again with the option -v7",
+            "is of version 7.3 (HDF5), which is not read",
+            "save it in MATLAB with -v7",
             file=path,
         )
     if data[:10] != b"MATLAB 5.0" or len(data) < _HEADER or data[126:128] not in (b"IM", b"MI"):
-        raise WildlabError(
-            "is not a MATLAB file of version 5 to 7", "save it in MATLAB with the option -v7", file=path
-        )
+        raise WildlabError("is no MATLAB file of version 5 to 7", "save it in MATLAB with -v7", file=path)
     try:
         size = _unpacked(data)
     except (zlib.error, struct.error) as error:
@@ -162,7 +160,7 @@ def read_matlab(path: Path, data: bytes) -> dict[str, Any]:
     if size > MOST_BYTES:
         raise WildlabError(
             f"holds more than {MOST_BYTES >> 20} MiB once it is unpacked",
-            "save the variables that the recipe needs in a file of their own",
+            "save only what the recipe needs",
             file=path,
         )
     try:
@@ -170,7 +168,7 @@ def read_matlab(path: Path, data: bytes) -> dict[str, Any]:
             warnings.simplefilter("ignore")
             shapes = [math.prod(shape) for _, shape, _ in reader.whosmat(io.BytesIO(data))]
             if max(shapes, default=0) > MOST_BYTES // 8:
-                raise ValueError("a variable claims to have more values than any log")
+                raise ValueError("a variable has too many values")
             return dict(reader.loadmat(io.BytesIO(data), simplify_cells=True))
     except Exception as error:  # whatever a file made to mislead the reader brings about
         raise _damaged(path, error) from None
@@ -179,7 +177,7 @@ def read_matlab(path: Path, data: bytes) -> dict[str, Any]:
 def _damaged(path: Path, error: Exception) -> WildlabError:
     first = (str(error).strip() or type(error).__name__).splitlines()[0]
     problem = f"is a damaged MATLAB file ({printable(first[:120])})"
-    return WildlabError(problem, "copy it again from where it came, or save it again in MATLAB", file=path)
+    return WildlabError(problem, "copy or save it again", file=path)
 
 
 def _unpacked(data: bytes) -> int:
@@ -228,7 +226,7 @@ def table_of(variables: dict[str, Any], block: MatlabTable, path: Path, part: st
             shape = " x ".join(str(n) for n in matrix.shape)
             raise WildlabError(
                 f"the matrix {block.matrix!r} is {shape}, and there are {len(set(names))} names of columns",
-                "name each of its columns once, in order",
+                "name each column once, in order",
                 file=path,
                 field=f"{printable(block.matrix)} (in [{part}])",
             )
@@ -241,7 +239,7 @@ def table_of(variables: dict[str, Any], block: MatlabTable, path: Path, part: st
             "there are no rows in it"
             if odd is None
             else f"has {lengths[odd]} values, and {first!r} has {length}",
-            "put fields of one length into one table, those of another length into another",
+            "make a table of each length",
             file=path,
             field=f"{printable(odd or first)} (in [{part}])",
         )
@@ -253,7 +251,7 @@ def _member(here: Any, name: str, gone: list[str], path: Path, part: str) -> Any
         return here[name]
     where = ".".join(gone)
     if not isinstance(here, dict):
-        problem, fix = f"{where!r} is not a struct", "mend the path in the recipe"
+        problem, fix = f"{where!r} is not a struct", "mend the path"
     else:
         problem = f"there is no {name!r} in " + (f"the struct {where!r}" if where else "this file")
         fix = did_you_mean(name, here)
@@ -270,8 +268,8 @@ def _column(value: Any, name: str, path: Path, part: str) -> NDArray[Any]:
         return np.array([str(one).strip() for one in column], dtype=object)
     shape = " x ".join(str(n) for n in column.shape)
     raise WildlabError(
-        f"is {shape} of {column.dtype}, and a column is one row of real numbers or of text",
-        "name a field that is a vector, or a matrix with the names of its columns",
+        f"is {shape} of {column.dtype}, and a column is real numbers or text",
+        "name a vector, or a matrix and its columns",
         file=path,
         field=f"{printable(name)} (in [{part}])",
     )

@@ -151,7 +151,7 @@ def read_position(table: RawTable, position: Position, part: str) -> RawPosition
         table.refuse(
             np.abs(values) > limit,
             beyond,
-            "check the column and its unit in the recipe",
+            "check column and unit",
             getattr(position, name).column or "value",
             f"{part}.{name}",
         )
@@ -161,8 +161,7 @@ def read_position(table: RawTable, position: Position, part: str) -> RawPosition
     if position.form == "wgs84":
         table.refuse(
             nowhere,
-            f"latitude and longitude are both 0, here and in {int(nowhere.sum()) - 1} other rows: no "
-            "position was known yet",
+            f"latitude and longitude are both 0 in {int(nowhere.sum())} rows",
             "take out these rows",
             (position.latitude.column if position.latitude else None) or "value",
             f"{part}.latitude",
@@ -259,8 +258,8 @@ def _read_attitude(table: RawTable, attitude: Attitude, part: str) -> Array:
     norm = np.linalg.norm(q, axis=1)
     table.refuse(
         np.abs(norm - 1) > NORM_TOLERANCE,
-        lambda row: f"the quaternion is not normalised, its length is {norm[row]:.4g}",
-        "check that these are the four parts of a rotation, and mend or take out the row",
+        lambda row: f"not normalised: its length is {norm[row]:.4g}",
+        "check that these are the parts of a rotation",
         ", ".join(attitude.quaternion),
         f"{part}.quaternion",
     )
@@ -308,7 +307,7 @@ def _refuse_differing(
         lambda row: (
             f"this row of frame {ids[row]!r} says something else than line {table.lines[first[frame[row]]]}"
         ),
-        "give each frame one pose, or name more columns that tell frames apart",
+        "give each frame one pose, or more unique columns",
         column,
         part,
     )
@@ -344,9 +343,8 @@ def _yaw_from_bearing(
     largest = float(np.abs(off[worst]))
     if largest > bearing.largest_deviation_deg:
         raise table.fail(
-            f"the yaw that this bearing gives is {largest:.3g} deg from the mean of its frame, more than "
-            f"{bearing.largest_deviation_deg:g} deg",
-            "look for a wrong sign, a wrong column, or frames that are not told apart",
+            f"its yaw is {largest:.3g} deg from the frame's mean, over {bearing.largest_deviation_deg:g}",
+            "look for a wrong sign or column, or frames that are one",
             "yaw",
             part,
             worst,
@@ -475,7 +473,7 @@ def _groups(rows: RawTable, block: FramesPart) -> Text:
         row = int(np.argmin(nearest))
         raise rows.fail(
             f"{value[row]:g} is closer than {group.clear:g} to the edge between two groups",
-            "look at how the numbers are spread, and move the edges",
+            "move the edges",
             group.column,
             "frames.group",
             row,
@@ -531,9 +529,7 @@ def read_detections(
     rows = raw.series(block, part, may_be_empty=True)  # a night in which nothing was seen
     frame = frames_of_rows(frames, recipe, block, block.frame, rows, part)
     if frame is None and block.kind == "pixel":
-        raise rows.fail(
-            "nothing says which frame a pixel is in", "name the column of the frame", "frame", part
-        )
+        raise rows.fail("a pixel needs a frame", "name its column", "frame", part)
     columns: dict[str, Text | Array | str] = {
         "detection_id": np.array(_numbered(block.prefix, len(rows)), dtype=object)
         if block.id is None
@@ -570,8 +566,8 @@ def _headings(rows: RawTable, frame: Text | None, lens: pd.DataFrame, part: str)
     """Where the bow points at each detection, rad from north towards east."""
     if frame is None:
         raise rows.fail(
-            "these bearings count from the bow, and nothing says when they were taken",
-            "name the column of the frame, and give the frames a time",
+            "bearings from the bow need a time",
+            "name the column of the frame",
             "frame",
             part,
         )
@@ -580,10 +576,10 @@ def _headings(rows: RawTable, frame: Text | None, lens: pd.DataFrame, part: str)
     rows.refuse(
         unknown,
         lambda row: (
-            f"this bearing counts from the bow, and no pose says where that points in frame {frame[row]!r}: "
+            f"no pose says where the bow points in frame {frame[row]!r}: "
             f"{int(unknown.sum())} of {len(frame)} are so"
         ),
-        "give poses for as long as anything is detected, or leave these rows out with `where`",
+        "give poses, or leave these rows out with `where`",
         "counts_from",
         part,
     )
