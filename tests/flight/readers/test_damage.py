@@ -34,8 +34,8 @@ AIRDATA = of_airdata.table(of_airdata.rows(120))
 @pytest.mark.parametrize(
     ("reader", "data", "words"),
     [
-        (ubx, message("NAV-DOP", iTOW=5), "1 message"),
-        (ubx, b"", "0 messages of u-blox"),
+        (ubx, message("NAV-DOP", iTOW=5), "none with a position"),
+        (ubx, b"", "none with a position"),
         (nmea, of_nmea.said("GPHDT,12.0,T"), "1 sentence"),
         (mrk, "hello", "1 line"),
         (srt, subtitles("hello", "GPS(n/a, n/a, 0)"), "2 subtitles"),

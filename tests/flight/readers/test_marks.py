@@ -114,8 +114,8 @@ def test_what_is_refused(reader, data, problem):
 
 def test_more_of_xml_than_memory_is_for_is_refused(monkeypatch):
     for name, most, problem in (
-        ("MOST_ELEMENTS", 5, "more than 5 elements"),
-        ("MOST_XML", 99, "99 are the most"),
+        ("MOST_ELEMENTS", 5, "too many"),
+        ("MOST_XML", 99, "more than 99 bytes"),
     ):
         with monkeypatch.context() as bound, pytest.raises(WildlabError, match=problem):
             bound.setattr(text, name, most)

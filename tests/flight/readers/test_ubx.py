@@ -8,7 +8,7 @@ import pytest
 from pyubx2 import GET, UBXMessage, UBXReader
 
 from tests.flight.readers.tracks import Reader, check, columns_of, near
-from wildlab.flight.readers.receivers import frames
+from wildlab.flight.readers.tracks import frames
 
 ubx = Reader("ubx")
 
@@ -107,17 +107,6 @@ def test_old_receivers(left_out):
         near(columns, v_east_m_s=-2.0)
     assert ("fix" in columns) == ("NAV-SOL" not in left_out)
     assert columns["use"].all()
-
-
-def test_more_digits():
-    fine = {"lon": 10.4, "lat": -63.4, "height": 140100, "hMSL": 100000, "hAcc": 14.1, "vAcc": 20}
-    data = b"".join(
-        pvt(k) + message("NAV-HPPOSLLH", iTOW=1000 * (TOW + k), _HPlat=37e-9, _HPheight=0.4, **fine)
-        for k in range(4)
-    )
-    columns = columns_of(ubx, data)
-    near(columns, 1e-10, latitude_deg=-63.4 + 37e-9)
-    near(columns, 1e-6, height_ellipsoid_m=140.1004, sd_horizontal_m=0.0141)
 
 
 def test_attitude_of_nav_att():

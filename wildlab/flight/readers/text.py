@@ -10,11 +10,10 @@ import re
 import unicodedata
 from collections.abc import Iterable
 from datetime import UTC, datetime
-from itertools import count, dropwhile
+from itertools import dropwhile
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn
-from xml.etree.ElementTree import Element, TreeBuilder
-from xml.parsers import expat
+from typing import Any, NamedTuple
+from xml.etree.ElementTree import Element, ParseError, iterparse
 
 import numpy as np
 from numpy.typing import NDArray
@@ -359,11 +358,30 @@ def shown(value: Any) -> str:
 
 #: Bytes and elements of an XML file, and elements inside each other, at most.
 MOST_XML, MOST_ELEMENTS, DEEPEST = 50_000_000, 1_000_000, 50
+_DECLARED = re.compile(rb"\s*<\?xml[^>]*encoding=[\"'](iso-8859-\d{1,2}|windows-125\d)[\"']", re.IGNORECASE)
+_DOCTYPE = re.compile(r"<!\s*(DOCTYPE|ENTITY|ELEMENT|ATTLIST|NOTATION)", re.IGNORECASE)
+
+
+def xml_text(data: bytes, path: Path | None) -> str:
+    """Text of an XML file, before any parser sees it.
+
+    Raises
+    ------
+    WildlabError
+        Where it is too large, or declares a document type or entities; `path` is for messages.
+    """
+    declared = _DECLARED.match(data)
+    content = data.decode(declared[1].decode(), "replace") if declared else decode(data)
+    content = content.replace("\0", "")
+    large = len(data) > MOST_XML
+    if large or _DOCTYPE.search(content):
+        problem = f"has more than {MOST_XML:,} bytes" if large else "declares a document type or entities"
+        raise WildlabError(problem, "export it anew", file=path)
+    return content
 
 
 def parse_xml(data: bytes, path: Path | None = None, what: str = "readable XML") -> Element:
-    """The root of an XML file, without entities, links or else what reaches out; name spaces stand before
-    names.
+    """The root of an XML file, names without their name spaces.
 
     Parameters
     ----------
@@ -384,32 +402,16 @@ def parse_xml(data: bytes, path: Path | None = None, what: str = "readable XML")
     def fail(problem: str) -> WildlabError:
         return WildlabError(problem, "export it anew", file=path)
 
-    def refuse(*_: object) -> NoReturn:
-        raise fail("declares a document type or entities, which no such file needs")
-
-    def start(tag: str, attributes: dict[str, str]) -> None:
-        if len(inside) >= DEEPEST:
-            raise fail("its elements are too deep in each other")
-        if next(counted) >= MOST_ELEMENTS:
-            raise fail(f"has more than {MOST_ELEMENTS:,} elements")
-        inside.append(tag)
-        builder.start(tag, attributes)
-
-    def end(tag: str) -> None:
-        builder.end(inside.pop())
-
-    if len(data) > MOST_XML:
-        raise fail(f"has {len(data):,} bytes, and {MOST_XML:,} are the most that is read of XML")
-    counted = count()
-    inside: list[str] = []
-    builder = TreeBuilder()
-    parser = expat.ParserCreate(namespace_separator=" ")
-    parser.buffer_text = True
-    parser.StartElementHandler, parser.EndElementHandler = start, end
-    parser.CharacterDataHandler = builder.data
-    parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = refuse
+    content = xml_text(data, path).encode("utf-8", "replace")
+    content = re.sub(rb"^\s*<\?xml[^>]*\?>", b"", content)
+    depth = 0
     try:
-        parser.Parse(data, True)
-    except expat.ExpatError as error:
+        events = iterparse(io.BytesIO(content), ("start", "end"))  # noqa: S314 - without entities
+        for number, (event, one) in enumerate(events):
+            depth += 1 if event == "start" else -1
+            one.tag = one.tag.rpartition("}")[2]
+            if depth > DEEPEST or number > 2 * MOST_ELEMENTS:
+                raise fail("its elements are too many, or too deep in each other")
+    except ParseError as error:
         raise fail(f"is not {what} ({printable(str(error))[:100]})") from None
-    return builder.close()
+    return one

@@ -78,8 +78,6 @@ def read_kml(data: bytes, path: Path) -> Kml:
         Where it is not KML, declares a document type or entities, or has coordinates that are none.
     """
     root = parse_xml(data, path, "KML")
-    for one in root.iter():
-        one.tag = one.tag.rpartition(" ")[2]
     if root.tag != "kml":
         raise WildlabError("is XML, and no KML", "export it as KML or GeoJSON", file=path)
 
