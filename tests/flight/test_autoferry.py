@@ -85,14 +85,14 @@ def test_truth_is_each_sample_once():
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ('{"sensorID": 5}', "sensorID: is 5, and known"),
-        ('{"time": "noon"}', "time: is 'noon'"),
-        (f'{{"time": 1{"0" * 400}}}', "time: a finite number"),
-        ('{"ownshipPosition": [4.0, 1e9]}', "ownshipPosition[1]: no more than 1e+06"),
-        ('{"sensorID": 1, "measurement": [1.0, 2.0, 3.0]}', "measurement: alike in length"),
-        ('{"sensorID": 1, "measurement": [[1.0, 2.0], [3.0]]}', "measurement: alike in length"),
-        ('{"sensorID": 2, "measurement": [[1.0, "x"], [3.0, 4.0]]}', "measurement[0][1]: is 'x'"),
-        ('{"measurement": [0.1, 57.0]}', "measurement[1]: is 57"),
+        ('{"sensorID": 5}', "sensorID"),
+        ('{"time": "noon"}', "time: 'noon' does"),
+        (f'{{"time": 1{"0" * 400}}}', "time: 1"),
+        ('{"ownshipPosition": [4.0, 1e9]}', "ownshipPosition[1]: 1000000000.0 does"),
+        ('{"sensorID": 1, "measurement": [1.0, 2.0, 3.0]}', "measurement"),
+        ('{"sensorID": 1, "measurement": [[1.0, 2.0], [3.0]]}', "measurement: as many norths"),
+        ('{"sensorID": 2, "measurement": [[1.0, "x"], [3.0, 4.0]]}', "measurement: 'x'"),
+        ('{"measurement": [0.1, 57.0]}', "measurement: 57"),
     ],
 )
 def test_hostile_detections_are_refused(change, said):

@@ -208,14 +208,14 @@ def test_tables_give_names_back_and_hold_no_formula(names):
 @settings(max_examples=25, deadline=None, derandomize=True)
 @given(st.lists(NAMES, min_size=1, max_size=4))
 def test_detections_and_clicks_are_read_back_by_name(names):
-    from wildlab.flight.readers.boxes import read_table_boxes
+    from wildlab.flight.readers.labels import read_table
     from wildlab.flight.readers.formats import read_log
 
     names = [shown for name in names if (shown := "".join(filter(str.isprintable, name)).strip())] or ["a"]
     found = pd.DataFrame({name: 5.0 for name in TABLE_COLUMNS}, index=range(len(names)))
     found = found.assign(frame_id=names, label=names)
-    marked = read_table_boxes(csv_text(found).encode(), Path("detections.csv"))
-    assert set(marked.names) == set(names)
+    marked = read_table(csv_text(found).encode(), Path("detections.csv"))
+    assert set(marked.table["name"]) == set(names)
     points = {f"{name}.jpg": [Point(name, 1.0, 2.0)] for name in names}
     session: Any = SimpleNamespace(points=points)
     part = read_log(Path("clicks.csv"), Session._text(session).encode(), "clicks").parts["clicks"]

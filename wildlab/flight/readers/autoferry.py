@@ -11,14 +11,17 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
+from pydantic import AfterValidator, BaseModel, Field, RootModel
 
 from wildlab.errors import WildlabError
+from wildlab.flight.files import check_model
 from wildlab.flight.readers.log import named
-from wildlab.flight.readers.text import Field, parse_json
+from wildlab.flight.readers.text import Real, parse_json
 
 Part = Literal["frames", "lidar", "radar", "ir", "eo", "truth"]
 
@@ -28,7 +31,48 @@ CAMERAS = ("ir", "eo")
 #: The published files have up to 0.6 MB; a frame has up to a few hundred bytes.
 MOST_BYTES = 64 << 20
 #: No coordinate of a ferry's surroundings is further from its origin, m.
-FURTHEST_M = 1e6
+Metres = Annotated[Real, Field(ge=-1e6, le=1e6)]
+Bearing = Annotated[Real, Field(ge=-2 * math.pi, le=2 * math.pi)]
+
+
+def _alike(measured: Any) -> Any:
+    if measured and isinstance(measured[0], list) and len(measured[0]) != len(measured[1]):
+        raise ValueError("it has not as many norths as easts; copy the published file again")
+    return measured
+
+
+class SeenBearings(BaseModel):
+    """A camera's frame."""
+
+    sensor: Literal[3, 4] = Field(alias="sensorID")
+    time: Real
+    own: tuple[Metres, Metres] = Field(alias="ownshipPosition")
+    measurement: Bearing | list[Bearing]
+
+
+class SeenPoints(SeenBearings):
+    """A frame of lidar or radar."""
+
+    sensor: Literal[1, 2] = Field(alias="sensorID")  # type: ignore[assignment]
+    measurement: Annotated[  # type: ignore[assignment]
+        tuple[()] | tuple[Metres, Metres] | tuple[list[Metres], list[Metres]], AfterValidator(_alike)
+    ]
+
+
+class Detections(RootModel[list[Annotated[SeenBearings | SeenPoints, Field(discriminator="sensor")]]]):
+    """A file of detections."""
+
+
+class Target(BaseModel):
+    """Where one target was."""
+
+    identity: Annotated[int, Field(alias="targetID", strict=True, ge=0, lt=1000)]
+    time: Real
+    position: tuple[Metres, Metres, Metres]
+
+
+class Truth(RootModel[list[list[Target]]]):
+    """A file of truth."""
 
 
 def read_part(path: Path, data: bytes, part: Part) -> tuple[dict[str, NDArray[Any]], NDArray[np.int64]]:
@@ -50,91 +94,54 @@ def read_part(path: Path, data: bytes, part: Part) -> tuple[dict[str, NDArray[An
     WildlabError
         Naming file, frame and field: not JSON, too large, another structure, a number that is none.
     """
-    if len(data) > MOST_BYTES:
-        limit = f"has more than {MOST_BYTES >> 20} MiB, and the published files less than one"
-        raise WildlabError(limit, "copy the published file again", file=path)
-    content = parse_json(data, path)
-    frames = content.items()
-    if not frames:
-        raise content.fail("a list of frames is wanted", "copy the published file again")
-    return _truth(frames) if part == "truth" else _detections(frames, part)
+    content = parse_json(data, path) if len(data) <= MOST_BYTES else None
+    if not isinstance(content, list) or not content:
+        problem = f"is no list of frames of at most {MOST_BYTES >> 20} MiB"
+        raise WildlabError(problem, "copy the published file again", file=path)
+    return _truth(content, path) if part == "truth" else _detections(content, part, path)
 
 
-def _detections(frames: list[Field], part: Part) -> tuple[dict[str, NDArray[Any]], NDArray[np.int64]]:
-    times = np.array([frame.member("time").number() for frame in frames])
-    own = np.array([_vector(frame.member("ownshipPosition"), 2) for frame in frames])
-    sensors, seen = [], []
-    for frame, place in zip(frames, own, strict=True):
-        sensors.append(_sensor(frame.member("sensorID")))
-        measured = frame.member("measurement")
-        seen.append(_bearings(measured) if sensors[-1] in CAMERAS else _points(measured) + place)
+def _detections(
+    content: list[Any], part: Part, path: Path
+) -> tuple[dict[str, NDArray[Any]], NDArray[np.int64]]:
+    found = check_model(Detections, content, path).root
+    table = pd.DataFrame(
+        [(SENSORS[one.sensor], one.time, *one.own) for one in found],
+        columns=["sensor", "time", "north", "east"],
+    )
     # Frames of one sensor come in order; those of several do not everywhere.
-    order = np.argsort(times, kind="stable")
-    names = np.empty(len(frames), dtype=object)
-    counted = dict.fromkeys(SENSORS.values(), 0)
-    for i in order:
-        counted[sensors[i]] += 1
-        names[i] = f"{sensors[i]}-{counted[sensors[i]]:04d}"
+    table = table.sort_values("time", kind="stable")
+    counted = table.groupby("sensor").cumcount() + 1
+    table["frame"] = table["sensor"] + counted.map("-{:04d}".format)
     if part == "frames":
-        kinds = np.array(sensors, dtype=object)[order]
-        columns = {"frame": names[order], "sensor": kinds, "time": times[order]}
-        return columns | named(("north", "east"), own[order].T), order + 1
-    rows = [i for i in order if sensors[i] == part]
-    of_row = np.repeat(rows, [len(seen[i]) for i in rows]).astype(np.int64)
+        columns = {name: table[name].to_numpy() for name in ("frame", "sensor", "time", "north", "east")}
+        return columns, table.index.to_numpy() + 1
+    ours = table[table["sensor"] == part]
     measures = ("bearing",) if part in CAMERAS else ("north", "east")
-    values = np.concatenate([np.empty((0, len(measures))), *(seen[i] for i in rows)])
-    return {"frame": names[of_row], **named(measures, values.T)}, of_row + 1
+    seen = [np.array(found[at].measurement, float).reshape(len(measures), -1).T for at in ours.index]
+    if part not in CAMERAS:
+        seen = [points + found[at].own for points, at in zip(seen, ours.index, strict=True)]
+    counts = [len(one) for one in seen]
+    values = np.concatenate([np.empty((0, len(measures))), *seen])
+    names = {"frame": np.repeat(ours["frame"].to_numpy(object), counts)}
+    return names | named(measures, values.T), np.repeat(ours.index.to_numpy(), counts) + 1
 
 
-def _truth(frames: list[Field]) -> tuple[dict[str, NDArray[Any]], NDArray[np.int64]]:
-    found: dict[tuple[str, float], tuple[NDArray[np.float64], int]] = {}
-    for i, frame in enumerate(frames):
-        for target in [frame] if isinstance(frame.value, dict) else frame.items():
-            identity = target.member("targetID")
-            if type(identity.value) is not int or not 0 <= identity.value < 1000:
-                raise identity.fail("the number of a target is wanted")
-            position = target.member("position")
-            place = _vector(position, 3)
-            known = found.setdefault((str(identity.value), target.member("time").number()), (place, i))
-            if not np.array_equal(known[0], place):
-                raise position.fail(f"the target is elsewhere at the same time in frame {known[1] + 1}")
-    keys = sorted(found)
-    values = np.array([found[key][0] for key in keys]).reshape(-1, 3)
-    columns: dict[str, NDArray[Any]] = {
-        "target": np.array([target for target, _ in keys], dtype=object),
-        "time": np.array([time for _, time in keys], dtype=float),
-    }
-    columns |= named(("north", "east", "down"), values.T)
-    return columns, np.array([found[key][1] + 1 for key in keys], dtype=np.int64)
-
-
-def _sensor(identity: Field) -> str:
-    if type(identity.value) is not int or identity.value not in SENSORS:
-        raise identity.fail("known are " + ", ".join(f"{key} ({name})" for key, name in SENSORS.items()))
-    return SENSORS[identity.value]
-
-
-def _bearings(measured: Field) -> NDArray[np.float64]:
-    """(M, 1) of a number or a list of them."""
-    several = measured.items() if isinstance(measured.value, list) else [measured]
-    return np.array([one.number(2 * math.pi) for one in several], dtype=float).reshape(-1, 1)
-
-
-def _points(measured: Field) -> NDArray[np.float64]:
-    """(M, 2) of ``[]``, ``[north, east]`` or ``[[north, ...], [east, ...]]``."""
-    rows = measured.items()
-    if not rows:
-        return np.empty((0, 2))
-    lists = [row for row in rows if isinstance(row.value, list)]
-    if len(rows) == 2 and not lists:
-        return _vector(measured, 2)[None]
-    if len(rows) == len(lists) == 2 and len(rows[0].value) == len(rows[1].value):
-        return np.array([_vector(row, len(row.value)) for row in rows]).reshape(2, -1).T
-    raise measured.fail("a list of norths and one of easts are wanted, alike in length")
-
-
-def _vector(field: Field, length: int) -> NDArray[np.float64]:
-    several = field.items()
-    if len(several) != length:
-        raise field.fail(f"it has {len(several)} numbers where {length} are wanted")
-    return np.array([one.number(FURTHEST_M) for one in several], dtype=float)
+def _truth(content: list[Any], path: Path) -> tuple[dict[str, NDArray[Any]], NDArray[np.int64]]:
+    frames = check_model(Truth, [one if isinstance(one, list) else [one] for one in content], path).root
+    names = ["target", "time", "north", "east", "down"]
+    table = pd.DataFrame(
+        [
+            (str(one.identity), one.time, *one.position, at)
+            for at, frame in enumerate(frames, 1)
+            for one in frame
+        ],
+        columns=[*names, "row"],
+    )
+    table = table.drop_duplicates(names)
+    twice = table.duplicated(["target", "time"])
+    if twice.any():
+        problem = f"the target is elsewhere at the same time in frame {table['row'][twice].iloc[0]}"
+        raise WildlabError(problem, "copy the published file again", file=path, field="position")
+    table = table.sort_values(["target", "time"])
+    return {name: table[name].to_numpy() for name in names}, table["row"].to_numpy(np.int64)

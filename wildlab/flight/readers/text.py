@@ -12,11 +12,12 @@ from collections.abc import Iterable
 from datetime import UTC, datetime
 from itertools import dropwhile
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 from xml.etree.ElementTree import Element, ParseError, iterparse
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import AllowInfNan, Strict
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import printable
@@ -244,116 +245,24 @@ def read_text_table(data: bytes, path: Path) -> TextTable:
 # -- JSON and XML
 
 
-class Field(NamedTuple):
-    """A value of a JSON file and where it stands: ``images[3].bbox``."""
-
-    value: Any
-    where: str
-    path: Path
-
-    def fail(self, wanted: str, fix: str = "mend it") -> WildlabError:
-        """An error that says what is there and what is wanted, to be raised."""
-        return WildlabError(
-            f"is {shown(self.value)}, and {wanted}", fix, file=self.path, field=self.where or None
-        )
-
-    def member(self, key: str) -> Field:
-        """A member of an object; of one that is not there the value is None."""
-        if not isinstance(self.value, dict):
-            raise self.fail("an object is wanted")
-        return Field(self.value.get(key), f"{self.where}.{key}" if self.where else key, self.path)
-
-    def items(self) -> list[Field]:
-        """What stands in a list."""
-        if not isinstance(self.value, list):
-            raise self.fail("a list is wanted")
-        return [Field(one, f"{self.where}[{at}]", self.path) for at, one in enumerate(self.value)]
-
-    def number(self, most: float = math.inf) -> float:
-        """A finite number that is no further from zero than `most`."""
-        found = finite(self.value)
-        if math.isnan(found):
-            raise self.fail("a finite number is wanted")
-        if abs(found) > most:
-            raise self.fail(f"no more than {most:g} is wanted")
-        return found
-
-    def name(self) -> str:
-        """A text that is not empty."""
-        if not isinstance(self.value, str) or not self.value:
-            raise self.fail("a name is wanted")
-        return self.value
-
-    def identity(self) -> int | str:
-        """A whole number or a text."""
-        if isinstance(self.value, bool) or not isinstance(self.value, int | str):
-            raise self.fail("a number or a name is wanted")
-        return self.value
+#: A finite number, and what names a thing; true is neither.
+Real = Annotated[float, Strict(), AllowInfNan(False)]
+Identity = Annotated[int, Strict()] | Annotated[str, Strict()]
 
 
-def parse_json(data: bytes, path: Path, what: str = "readable JSON", *, plain: bool = True) -> Field:
-    """The content of a JSON file.
-
-    Parameters
-    ----------
-    data
-        UTF-8.
-    path
-        For messages.
-    what
-        What it should be, for messages.
-    plain
-        Whether numbers that are none (``NaN``) and names that stand twice in an object are refused.
+def parse_json(data: bytes, path: Path, what: str = "readable JSON") -> Any:
+    """The content of a JSON file in UTF-8; `path`, and `what` it should be, are for messages.
 
     Raises
     ------
     WildlabError
         Where it is not JSON, or nested too deeply.
     """
-
-    def constant(name: str) -> float:
-        if plain:
-            raise ValueError(f"{name} is not JSON")
-        return float(name)
-
-    def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        found = dict(pairs)
-        if plain and len(found) < len(pairs):
-            raise ValueError("a name stands twice in one object")
-        return found
-
     try:
-        text = data.decode("utf-8-sig")
-        return Field(json.loads(text, parse_constant=constant, object_pairs_hook=once), "", path)
+        return json.loads(data.decode("utf-8-sig"))
     except (ValueError, RecursionError) as error:
         said = printable(str(error) or "its brackets are too deep")[:100]
         raise WildlabError(f"is not {what} ({said})", "write it anew, in UTF-8", file=path) from None
-
-
-def finite(value: Any) -> float:
-    """A JSON value as a finite number, NaN where it is none.
-
-    Examples
-    --------
-    >>> finite(3), finite("3"), finite(True), finite(10**400)
-    (3.0, nan, nan, nan)
-    """
-    try:
-        found = math.nan if isinstance(value, bool) or not isinstance(value, int | float) else float(value)
-    except OverflowError:
-        return math.nan
-    return found if math.isfinite(found) else math.nan
-
-
-def shown(value: Any) -> str:
-    """A value of a hostile file, short and printable, in at most 60 characters."""
-    if value is None:
-        return "missing"
-    try:
-        text = printable(repr(value))
-    except ValueError:  # an integer with thousands of digits
-        text = "a number with too many digits"
-    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 #: Bytes and elements of an XML file, and elements inside each other, at most.

@@ -1,7 +1,9 @@
 """Areas and surveyed points out of KML, GeoJSON (RFC 7946) and tables that people write.
 
 Positions are longitude and latitude of WGS84; the member ``crs`` of GeoJSON's older draft is taken where it
-says the same. Of KML, points and polygons of placemarks are read, and nothing that a file could ask for.
+says the same. Of KML, points and polygons of placemarks are read, and nothing that a file could ask for; a
+height counts from sea level, and only where its mode is ``absolute``. Those of GeoJSON count from the
+ellipsoid.
 """
 
 from __future__ import annotations
@@ -11,26 +13,17 @@ import re
 import tomllib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
-from xml.etree.ElementTree import Element
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
+from pydantic import BaseModel, Field
 
 from wildlab.errors import WildlabError
-from wildlab.flight.files import printable, read_regular
+from wildlab.flight.files import check_model, printable, read_regular
 from wildlab.flight.readers.log import Decoded, Readings, holding
-from wildlab.flight.readers.text import (
-    Field,
-    finite,
-    header_of,
-    parse_json,
-    parse_xml,
-    plain,
-    read_text_table,
-)
+from wildlab.flight.readers.text import Real, header_of, parse_json, parse_xml, plain, read_text_table
 from wildlab.geometry.frames import (
     Array,
     Origin,
@@ -44,74 +37,62 @@ from wildlab.paths import DATA
 #: Letters of a name that are kept.
 MOST_LETTERS = 200
 
-# -- KML
 
-#: Longitude and latitude in degrees, altitude in m or NaN.
-Place = tuple[float, float, float]
+class Place(NamedTuple):
+    """A point or a polygon.
 
-
-class Placemark(NamedTuple):
-    """A point or a polygon of a placemark.
-
-    `rings` of places, the outer one first; of a point one with a single place. `mode`: KML's altitudeMode.
+    `rings`: (K, 3) longitude and latitude in degrees, height in m or NaN; the outer one first, of a point one
+    with a single row. `row`: which feature of the file it is of, from 1. `properties`: of the feature.
     """
 
     name: str
-    rings: list[list[Place]]
-    mode: str = ""
+    is_point: bool
+    rings: list[Array]
+    row: int
+    properties: dict[str, Any]
 
 
-class Kml(NamedTuple):
-    """Polygons and points of a KML file, and how many geometries it has that are no points."""
-
-    polygons: list[Placemark]
-    points: list[Placemark]
-    others: int
-
-
-def read_kml(data: bytes, path: Path) -> Kml:
-    """Polygons and points of a KML file; `path` is for messages.
+def read_places(data: bytes, path: Path) -> tuple[list[Place], int]:
+    """Points and polygons of a KML or GeoJSON file, and how many geometries it has besides.
 
     Raises
     ------
     WildlabError
-        Where it is not KML, declares a document type or entities, or has coordinates that are none.
+        Where it is neither, or something in it is wrong; `path` is for messages.
     """
+    start = data[:200].lstrip(b"\xef\xbb\xbf \t\r\n")
+    if start[:4] == b"PK\x03\x04":
+        raise WildlabError("is a zip, as KMZ is", "unpack it, and give the KML inside", file=path)
+    return _kml(data, path) if start[:1] == b"<" else _geojson(data, path)
+
+
+def _kml(data: bytes, path: Path) -> tuple[list[Place], int]:
     root = parse_xml(data, path, "KML")
     if root.tag != "kml":
         raise WildlabError("is XML, and no KML", "export it as KML or GeoJSON", file=path)
-
-    def places(of: Element, where: str) -> list[list[Place]]:
-        return [_places(one.text or "", path) for one in of.iterfind(f"{where}coordinates")]
-
-    found = Kml([], [], sum(len(list(root.iter(one))) for one in ("LineString", "Track", "Model", "Polygon")))
-    rings = len(list(root.iter("LinearRing"))) - len(root.findall(".//Polygon//LinearRing"))
-    for mark in root.iter("Placemark"):
+    found: list[Place] = []
+    for row, mark in enumerate(root.iter("Placemark"), 1):
         name = (mark.findtext("name") or "")[:MOST_LETTERS]
-        for one in mark.iter("Point"):
-            mode = (one.findtext("altitudeMode") or "clampToGround").strip()[:MOST_LETTERS]
-            found.points.extend(Placemark(name, [ring[:1]], mode) for ring in places(one, "") if ring)
-        for one in mark.iter("Polygon"):
-            outer = places(one, "outerBoundaryIs//")
-            if not outer:
-                raise WildlabError("a polygon has no outline", "export it anew", file=path)
-            found.polygons.append(Placemark(name, [outer[0], *places(one, "innerBoundaryIs//")]))
-    return found._replace(others=found.others + rings)
+        for kind in ("Point", "Polygon"):
+            for one in mark.iter(kind):
+                rings = [_ring(each.text or "", path) for each in one.iter("coordinates")]
+                if not rings or not len(rings[0]):
+                    raise WildlabError(f"a {kind} has no coordinates", "export it anew", file=path)
+                if (one.findtext("altitudeMode") or "").strip() != "absolute":
+                    rings[0][:, 2] = np.nan
+                found.append(Place(name, kind == "Point", rings, row, {}))
+    return found, sum(1 for one in root.iter() if one.tag in ("LineString", "Track", "Model"))
 
 
-def _places(words: str, path: Path) -> list[Place]:
-    places = []
-    for word in words.split():
-        parts = word.split(",")
-        try:
-            high = float(parts[2]) if len(parts) > 2 and parts[2] else math.nan
-            places.append((float(parts[0]), float(parts[1]), high))
-        except (ValueError, IndexError):
-            fix = "give longitude,latitude with a comma and without blanks between them"
-            raise WildlabError(
-                f"{printable(word)[:40]!r} is no coordinate", fix, file=path, field="coordinates"
-            ) from None
-    return places
+def _ring(words: str, path: Path) -> Array:
+    """(K, 3) of the text of an element ``coordinates``."""
+    try:
+        places = [[float(part) for part in f"{word},nan".split(",")[:3] if part] for word in words.split()]
+        return np.array(places, float).reshape(-1, 3)
+    except ValueError:
+        problem = f"{printable(words.strip()[:40])!r} is no coordinate"
+        fix = "give longitude,latitude with a comma and without blanks between them"
+        raise WildlabError(problem, fix, file=path, field="coordinates") from None
 
 
 # -- GeoJSON
@@ -120,50 +101,125 @@ def _places(words: str, path: Path) -> list[Place]:
 WGS84 = re.compile(r"(urn:ogc:def:crs:)?(OGC:(1\.3)?:?CRS84|EPSG:([\d.]*:)?(4326|4979))", re.IGNORECASE)
 #: Properties that name a feature, in this order, without regard to capitals.
 PROPERTIES = ("name", "id", "label", "title", "point", "target", "target_id", "code")
+Position = Annotated[list[Real], Field(min_length=2, max_length=4)]
+Rings = Annotated[list[list[Position]], Field(min_length=1)]
 
 
-class Feature(NamedTuple):
-    """A feature of GeoJSON, or a geometry by itself: its properties, its name, and its geometries."""
+class Point(BaseModel):
+    """One place."""
 
-    properties: dict[str, Any]
+    type: Literal["Point"]
+    coordinates: Position
+
+
+class MultiPoint(BaseModel):
+    """Places."""
+
+    type: Literal["MultiPoint"]
+    coordinates: list[Position]
+
+
+class Polygon(BaseModel):
+    """One polygon."""
+
+    type: Literal["Polygon"]
+    coordinates: Rings
+
+
+class MultiPolygon(BaseModel):
+    """Polygons."""
+
+    type: Literal["MultiPolygon"]
+    coordinates: list[Rings]
+
+
+class Lines(BaseModel):
+    """What is not read."""
+
+    type: Literal["LineString", "MultiLineString"]
+
+
+class Geometries(BaseModel):
+    """Geometries together."""
+
+    type: Literal["GeometryCollection"]
+    geometries: list[Geometry]
+
+
+Geometry = Annotated[
+    Point | MultiPoint | Polygon | MultiPolygon | Lines | Geometries, Field(discriminator="type")
+]
+
+
+class Feature(BaseModel):
+    """A geometry with its properties."""
+
+    geometry: Geometry | None
+    properties: dict[str, Any] | None = None
+    id: Any = None
+
+
+class CrsName(BaseModel):
+    """Of the older draft."""
+
     name: str
-    geometries: list[Field]
 
 
-def _features(found: Field, depth: int = 0) -> Iterator[Feature]:
-    """All features, collections of geometries taken apart."""
-    kind, crs = found.member("type").value, found.member("crs")
-    if crs.value is not None:
-        about = crs.value.get("properties") if isinstance(crs.value, dict) else None
-        name = about.get("name") if isinstance(about, dict) else None
-        if not isinstance(name, str) or not WGS84.fullmatch(name.strip().replace("::", ":")):
-            raise crs._replace(value=crs.value if name is None else name).fail(
-                "WGS84 is wanted", "write longitude and latitude in degrees (EPSG:4326)"
-            )
-    if kind == "FeatureCollection" and depth == 0:
-        for one in found.member("features").items():
-            yield from _features(one, 1)
-        return
-    given = found.member("properties").value
-    own = given if isinstance(given, dict) else {}
-    about = {str(key).lower(): value for key, value in own.items()}
-    named = (*(about.get(one) for one in PROPERTIES), found.value.get("id"))
-    name = next((str(one) for one in named if one not in (None, "") and isinstance(one, str | int)), "")
-    yield Feature(own, name, list(_geometries(found.member("geometry") if kind == "Feature" else found)))
+class NamedCrs(BaseModel):
+    """Of the older draft."""
+
+    properties: CrsName
 
 
-def _geometries(found: Field, depth: int = 0) -> Iterator[Field]:
-    if isinstance(found.value, dict) and found.value.get("type") == "GeometryCollection" and depth < 5:
-        for one in found.member("geometries").items():
-            yield from _geometries(one, depth + 1)
-    else:
-        yield found
+class Features(BaseModel):
+    """A FeatureCollection."""
+
+    features: list[Feature]
+    crs: NamedCrs | None = None
 
 
-def _parts(geometry: Field, kind: str) -> list[Field] | None:
-    """Coordinates of a geometry of a kind or of several such; None where it is of another kind."""
-    own, given = geometry.member("type").value, geometry.member("coordinates")
-    return [given] if own == kind else given.items() if own == f"Multi{kind}" else None
+def _geojson(data: bytes, path: Path) -> tuple[list[Place], int]:
+    content = parse_json(data, path, "GeoJSON")
+    kind = content.get("type") if isinstance(content, dict) else None
+    if kind != "FeatureCollection":
+        feature = content if kind == "Feature" else {"geometry": content}
+        content = {"features": [feature], "crs": content.get("crs") if kind else None}
+    given = check_model(Features, content, path)
+    if given.crs and not WGS84.fullmatch(given.crs.properties.name.strip().replace("::", ":")):
+        problem = f"is in {printable(given.crs.properties.name)[:60]}, and WGS84 is wanted"
+        fix = "write longitude and latitude in degrees (EPSG:4326)"
+        raise WildlabError(problem, fix, file=path, field="crs")
+    found: list[Place] = []
+    others = 0
+    for row, one in enumerate(given.features, 1):
+        own = one.properties or {}
+        about = {key.lower(): value for key, value in own.items()}
+        named = (*(about.get(key) for key in PROPERTIES), one.id)
+        name = next(
+            (str(word) for word in named if word not in (None, "") and isinstance(word, str | int)), ""
+        )
+        for each in _taken_apart(one.geometry):
+            if isinstance(each, Lines):
+                others += 1
+                continue
+            several = each.coordinates if each.type.startswith("Multi") else [each.coordinates]
+            is_point = each.type.endswith("Point")
+            for part in several:
+                rings: Any = [[part]] if is_point else part
+                found.append(Place(name, is_point, [_positions(ring) for ring in rings], row, own))
+    return found, others
+
+
+def _taken_apart(given: Any) -> Iterator[Any]:
+    if isinstance(given, Geometries):
+        for one in given.geometries:
+            yield from _taken_apart(one)
+    elif given is not None:
+        yield given
+
+
+def _positions(ring: list[list[float]]) -> Array:
+    return np.array([[*one, np.nan][:3] for one in ring], float).reshape(-1, 3)
 
 
 # -- areas
@@ -175,6 +231,12 @@ MOST_AREAS = 500
 MOST_OF_NAME = 60
 #: Metres from the middle of all areas beyond which they are no one place to be flown over.
 FURTHEST = 50_000.0
+#: The most points of a ring; a surveyor's fence has hundreds.
+MOST_POINTS = 5_000
+#: Square metres below which a ring is a slip of the pen.
+LEAST_AREA = 1.0
+#: Sine of the angle below which a side that turns back lies on the one before it.
+STRAIGHT = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,14 +281,6 @@ class Areas(NamedTuple):
     origin: Origin
 
 
-class Outline(NamedTuple):
-    """What a file has of an area: rings of (longitude, latitude) in degrees, the outer one first."""
-
-    name: str
-    rings: list[list[tuple[float, float]]]
-    animals: float = math.nan
-
-
 def read_areas(path: Path) -> Areas:
     """Areas of a GeoJSON or KML file.
 
@@ -260,62 +314,54 @@ def parse_areas(data: bytes, path: Path) -> Areas:
     WildlabError
         As `read_areas`.
     """
-    start = data[:200].lstrip(b"\xef\xbb\xbf \t\r\n")
-    if start[:1] == b"<":
-        found = [
-            Outline(one.name, [[place[:2] for place in ring] for ring in one.rings])
-            for one in read_kml(data, path).polygons
-        ]
-    elif start[:4] == b"PK\x03\x04":
-        raise WildlabError("is a zip, as KMZ is", "unpack it, and give the KML inside", file=path)
-    else:
-        found = list(_outlines(parse_json(data, path, "GeoJSON")))
-    if not found:
-        raise WildlabError("has no polygon", "draw the outline of each area as a polygon", file=path)
-    if len(found) > MOST_AREAS:
-        raise WildlabError(
-            f"has {len(found):,} polygons, and {MOST_AREAS} are the most",
-            "keep those to be searched",
-            file=path,
-        )
+    found = [one for one in read_places(data, path)[0] if not one.is_point]
+    if not 0 < len(found) <= MOST_AREAS:
+        fix = "draw the outline of each area to be searched as a polygon"
+        many = f"{len(found):,} polygons, and {MOST_AREAS} are the most" if found else "no polygon"
+        raise WildlabError(f"has {many}", fix, file=path)
     names = _names([one.name for one in found])
-    file = str(path)
+    animals = [_animals(one, found, path) for one in found]
     rings = [
-        [checked_ring(ring, _what(name, number), file) for number, ring in enumerate(one.rings)]
+        [checked_ring(ring[:, :2], _what(name, number), path) for number, ring in enumerate(one.rings)]
         for name, one in zip(names, found, strict=True)
     ]
     origin = _middle(np.concatenate([ring for each in rings for ring in each]))
     areas = []
-    for name, one, each in zip(names, found, rings, strict=True):
-        local = [_local(ring, origin) for ring in each]
-        for number, (ring, given) in enumerate(zip(local, each, strict=True)):
-            _near(ring, given, _what(name, number), file)
-            check_shape(ring, _what(name, number), file)
-        areas.append(Area(name, local[0], tuple(local[1:]), one.animals))
-        if areas[-1].size <= 0:
-            raise WildlabError(
-                f"the holes of {name} are larger than it is", "check which ring is the outer one", file=path
-            )
+    for name, count, each in zip(names, animals, rings, strict=True):
+        local = []
+        for number, ring in enumerate(each):
+            lon, lat = np.radians(ring).T
+            local.append(np.asarray(geodetic_to_ned(lat, lon, 0.0, origin)[:, :2]))
+            _check_shape(local[-1], _what(name, number), path)
+        areas.append(Area(name, local[0], tuple(local[1:]), count))
+        _refuse(areas[-1].size <= 0, f"the holes of {name} are larger than it is", "check the rings", path)
     return Areas(tuple(areas), origin)
+
+
+def _refuse(wrong: Any, problem: str, fix: str, path: Path) -> None:
+    if wrong:
+        raise WildlabError(problem, fix, file=path)
 
 
 def _what(name: str, ring: int) -> str:
     return f"the outline of {name}" if ring == 0 else f"hole {ring} of {name}"
 
 
-def _local(ring: Array, origin: Origin) -> Array:
-    lon, lat = np.radians(ring).T
-    return np.asarray(geodetic_to_ned(lat, lon, 0.0, origin)[:, :2])
-
-
-def _near(ring: Array, given: Array, what: str, file: str) -> None:
-    far = np.hypot(*ring.T)
-    if far.max() > FURTHEST:
-        raise WildlabError(
-            f"{what} lies {far.max() / 1000:,.0f} km from the middle of all areas",
-            "check signs and order of its coordinates, or plan far areas by themselves",
-            file=file,
+def _animals(one: Place, every: list[Place], path: Path) -> float:
+    """How many live there; parts of a feature cannot share them: sizes are not known yet."""
+    count = one.properties.get("animals")
+    if count is None:
+        return math.nan
+    parts = sum(other.row == one.row for other in every)
+    if parts > 1:
+        problem = (
+            f"{printable(one.name)} has {printable(str(count))[:40]} animals in {parts} polygons together"
         )
+        raise WildlabError(problem, "make each polygon a Feature of its own", file=path, field="animals")
+    if isinstance(count, bool) or not isinstance(count, int | float) or not 0 <= count < 1e9:
+        problem = f"an area has {printable(str(count))[:40]!r} animals"
+        raise WildlabError(problem, "give a number from 0 on, or take it out", file=path, field="animals")
+    return float(count)
 
 
 def _middle(points: Array) -> Origin:
@@ -346,80 +392,19 @@ def _names(given: list[str]) -> list[str]:
     return names
 
 
-_KIND = "give a Polygon, a MultiPolygon, a Feature or a FeatureCollection of them"
-
-
-def _outlines(found: Field) -> Iterator[Outline]:
-    """Outlines of the polygons of GeoJSON; the parts of a feature cannot share its animals: sizes are not
-    known yet."""
-    for one in _features(found):
-        count = one.properties.get("animals")
-        fail = partial(WildlabError, file=found.path, field="animals")
-        if count is not None and not 0 <= finite(count) < 1e9:
-            problem = f"an area has {printable(str(count))[:40]!r} animals"
-            raise fail(problem, "give a number from 0 on, or take the property out")
-        parts: list[Field] = []
-        for geometry in one.geometries:
-            more = _parts(geometry, "Polygon")
-            if more is None:
-                raise geometry.member("type").fail("polygons are wanted", _KIND)
-            parts += more
-        if len(parts) > 1 and count is not None:
-            problem = f"{one.name or 'an area'} has {count:g} animals in {len(parts)} polygons together"
-            raise fail(problem, "say for each polygon how many, as a Feature of its own")
-        animals = math.nan if count is None else float(count)
-        yield from (Outline(one.name, _rings(part, one.name), animals) for part in parts)
-
-
-def _rings(found: Field, name: str) -> list[list[tuple[float, float]]]:
-    rings = []
-    for ring, given in enumerate(found.items()):
-        what = printable(_what(name[:MOST_OF_NAME] or "an area", ring))
-        points = []
-        for point in given.items():
-            pair: Any = (
-                point.value if isinstance(point.value, list) and 2 <= len(point.value) <= 4 else [None]
-            )
-            if not all(isinstance(x, int | float) and not isinstance(x, bool) for x in pair):
-                raise point.fail(
-                    f"longitude and latitude of a point of {what} are wanted", "give two numbers"
-                )
-            # Also of whole numbers that are too large for one.
-            lon, lat = (float(x) if abs(x) < 1e300 else math.inf for x in pair[:2])
-            points.append((lon, lat))
-        if points and points[0] != points[-1]:
-            raise WildlabError(
-                f"{what} is not closed: its last point is not its first",
-                "repeat the first point at the end",
-                file=found.path,
-                field=given.where,
-            )
-        rings.append(points)
-    if not rings:
-        raise found.fail("a polygon has no ring", _KIND)
-    return rings
-
-
 # -- rings
 
-#: The most points of a ring; a surveyor's fence has hundreds.
-MOST_POINTS = 5_000
-#: Square metres below which a ring is a slip of the pen.
-LEAST_AREA = 1.0
-#: Sine of the angle below which a side that turns back lies on the one before it.
-STRAIGHT = 1e-9
 
-
-def checked_ring(points: list[tuple[float, float]], what: str, file: str) -> Array:
+def checked_ring(ring: Array, what: str, path: Path) -> Array:
     """Longitude and latitude of a ring, looked at as numbers on the Earth.
 
     Parameters
     ----------
-    points
-        Longitude and latitude, degrees; the last may repeat the first.
+    ring
+        (K, 2) longitude and latitude, degrees; the last may repeat the first.
     what
         Whose ring it is, for messages.
-    file
+    path
         Where it was found.
 
     Returns
@@ -431,83 +416,36 @@ def checked_ring(points: list[tuple[float, float]], what: str, file: str) -> Arr
     WildlabError
         Where there are too few or too many points, or they are not degrees of one place.
     """
-    if len(points) > MOST_POINTS + 1:
-        raise WildlabError(
-            f"{what} has {len(points):,} points, and {MOST_POINTS:,} are the most",
-            "simplify the outline",
-            file=file,
-        )
-    ring = np.array(points, float).reshape(-1, 2)
-    if not np.isfinite(ring).all():
-        at = int(np.flatnonzero(~np.isfinite(ring).all(axis=1))[0])
-        raise WildlabError(f"point {at + 1} of {what} is no finite number", "give degrees", file=file)
-    _on_the_earth(ring, what, file)
-    if len(ring) > 1 and (ring[0] == ring[-1]).all():
-        ring = ring[:-1]
-    if len(ring) > 1:
-        ring = ring[~(ring == np.roll(ring, 1, axis=0)).all(axis=1)]
-    if len(ring) < 3:
-        raise WildlabError(
-            f"{what} has {len(ring)} different point{'' if len(ring) == 1 else 's'}",
-            "an outline needs three corners at least",
-            file=file,
-        )
-    if np.ptp(ring[:, 0]) > 180:
-        raise WildlabError(
-            f"the longitudes of {what} span {np.ptp(ring[:, 0]):.0f} degrees",
-            "split an area that crosses the antimeridian into a polygon on each side",
-            file=file,
-        )
+    many = f"{what} has {len(ring):,} points, and {MOST_POINTS:,} are the most"
+    _refuse(len(ring) > MOST_POINTS + 1, many, "simplify the outline", path)
+    ring = ring[~(ring == np.roll(ring, -1, axis=0)).all(axis=1)]
+    few = f"{what} has {len(ring)} different points"
+    _refuse(len(ring) < 3, few, "an outline needs three corners at least", path)
+    _refuse(not np.isfinite(ring).all(), f"a point of {what} is no finite number", "give degrees", path)
+    east, north = np.abs(ring).max(axis=0)
+    degrees = f"{what} has a coordinate of {max(east, north):g}, which is no degree"
+    fix = "give longitude and latitude in degrees of WGS84 (EPSG:4326), not metres of a map projection"
+    _refuse(max(east, north) > 180, degrees, fix, path)
+    swapped = ": its coordinates are swapped" if east <= 90 else ""
+    latitude = f"{what} has a latitude of {north:g} degrees{swapped}"
+    _refuse(north > 90, latitude, "give longitude first, then latitude", path)
+    span = float(np.ptp(ring[:, 0]))
+    fix = "split an area that crosses the antimeridian into a polygon on each side"
+    _refuse(span > 180, f"the longitudes of {what} span {span:.0f} degrees", fix, path)
     return ring
 
 
-def _on_the_earth(ring: Array, what: str, file: str) -> None:
-    most = np.abs(ring).max(axis=0) if len(ring) else np.zeros(2)
-    if (most > 180).any():
-        raise WildlabError(
-            f"{what} has a coordinate of {most.max():g}, which is no degree",
-            "give longitude and latitude in degrees of WGS84 (EPSG:4326), not metres of a map projection",
-            file=file,
-        )
-    if most[1] > 90:
-        if most[0] <= 90:
-            raise WildlabError(
-                f"{what} has a latitude of {most[1]:g} degrees: its coordinates are swapped",
-                "give longitude first, then latitude",
-                file=file,
-            )
-        raise WildlabError(
-            f"{what} has a latitude of {most[1]:g} degrees", "give one of at most 90", file=file
-        )
-
-
-def check_shape(ring: Array, what: str, file: str) -> None:
-    """Refuse a ring that bounds nothing, or that is not sure what it bounds.
-
-    Parameters
-    ----------
-    ring
-        (K, 2) metres, not closed.
-    what, file
-        As for `checked_ring`.
-
-    Raises
-    ------
-    WildlabError
-        Where its area is next to nothing, or it crosses or touches itself.
-    """
+def _check_shape(ring: Array, what: str, path: Path) -> None:
+    """Refuse a ring (K, 2) in metres that is far away, bounds nothing, or is not sure what it bounds."""
+    far = float(np.hypot(*ring.T).max()) / 1000
+    away = f"{what} lies {far:,.0f} km from the middle of all areas"
+    _refuse(far > FURTHEST / 1000, away, "check its coordinates, or plan far areas by themselves", path)
     met = crossing(ring)
-    if met is not None:
-        one, other = met
-        raise WildlabError(
-            f"{what} crosses itself: the side after point {one + 1} meets the side after point {other + 1}",
-            "put its points in their order along the fence",
-            file=file,
-        )
-    if ring_area(ring) < LEAST_AREA:
-        raise WildlabError(
-            f"{what} bounds {ring_area(ring):.2g} square metres", "check its coordinates", file=file
-        )
+    sides = [f"the side after point {one + 1}" for one in met or ()]
+    crosses = f"{what} crosses itself: {' meets '.join(sides)}"
+    _refuse(met, crosses, "put its points in their order along the fence", path)
+    size = ring_area(ring)
+    _refuse(size < LEAST_AREA, f"{what} bounds {size:.2g} square metres", "check its coordinates", path)
 
 
 def ring_area(ring: Array) -> float:
@@ -536,19 +474,20 @@ def crossing(ring: Array) -> tuple[int, int] | None:
     >>> crossing(np.array([[0.0, 0.0], [0.0, 10.0], [10.0, 10.0]]))
     """
     n = len(ring)
-    begins, ends = ring, np.roll(ring, -1, axis=0)
+    ends = np.roll(ring, -1, axis=0)
+    ahead = ends - ring
+    after = np.roll(ahead, -1, axis=0)
+    lengths = np.hypot(*ahead.T) * np.hypot(*after.T)
+    # Neighbours meet beyond their corner only where the second one turns straight back.
+    back = (np.abs(_cross(ahead, after)) <= STRAIGHT * lengths) & ((ahead * after).sum(axis=1) < 0)
+    for one in np.flatnonzero(back).tolist():
+        first, second = sorted((one, (one + 1) % n))
+        return first, second
     for one in range(n):
-        others = np.arange(one + 1, n)
-        # Neighbours share a corner; they meet beyond it only where the second one turns straight back.
-        apart = others[(others != one + 1) & ~((one == 0) & (others == n - 1))]
-        met = _segments_meet(begins[one], ends[one], begins[apart], ends[apart])
+        apart = np.arange(one + 2, n - (one == 0))
+        met = _segments_meet(ring[one], ends[one], ring[apart], ends[apart])
         if met.any():
             return one, int(apart[np.argmax(met)])
-        follows = (one + 1) % n
-        ahead, back = ends[one] - begins[one], ends[follows] - begins[follows]
-        lengths = float(np.hypot(*ahead) * np.hypot(*back))
-        if abs(float(_cross(ahead, back))) <= STRAIGHT * lengths and float(ahead @ back) < 0:
-            return min(one, follows), max(one, follows)
     return None
 
 
@@ -600,37 +539,6 @@ def kml_sniff(head: bytes) -> bool:
     return head.lstrip(b"\xef\xbb\xbf \r\n\t")[:1] == b"<" and b"<kml" in head
 
 
-def kml_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
-    """Points of placemarks; a height counts from sea level, and only where its mode is ``absolute``.
-
-    Raises
-    ------
-    WildlabError
-        Where it is no KML, or has no point.
-    """
-    found = read_kml(data, path)
-    if not found.points:
-        what = f"has {found.others} lines or areas and no point" if found.others else "has no point"
-        raise WildlabError(what, "give placemarks with a point for each mark", file=path)
-    count = len(found.points)
-    longitude, latitude, height = np.array([one.rings[0][0] for one in found.points], float).T
-    absolute = np.array([one.mode == "absolute" for one in found.points], bool)
-    columns = {
-        "name": [one.name for one in found.points],
-        "longitude_deg": longitude,
-        "latitude_deg": latitude,
-        "height_sea_m": np.where(absolute, height, np.nan),
-    }
-    ground = int((~absolute & (height != 0) & np.isfinite(height)).sum())
-    notes = {
-        f"{ground} of {count} heights are not used: their altitudeMode is not absolute": ground > 0,
-        f"{int((~absolute).sum())} of {count} points have no height above sea level: write "
-        "<altitudeMode>absolute</altitudeMode> before <coordinates>, or give a table": not absolute.all(),
-    }
-    lost = [(found.others, "geometry", "besides: only points are marks")]
-    return _decoded(columns, range(1, count + 1), "point", lost, holding(notes))
-
-
 def geojson_sniff(head: bytes) -> bool:
     """Whether a file is GeoJSON, by the words that it begins with."""
     start = head.lstrip(b"\xef\xbb\xbf \r\n\t")[:1]
@@ -639,44 +547,37 @@ def geojson_sniff(head: bytes) -> bool:
     return start == b"{" and any(one in bare for one in kinds)
 
 
-def geojson_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
-    """Points of features: longitude, latitude and height above the ellipsoid of WGS 84.
+def kml_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
+    """Points of placemarks; errors as of `read_places`, and where there is no point."""
+    return _marks(path, data, "height_sea_m")
 
-    Raises
-    ------
-    WildlabError
-        Where it is no GeoJSON, in another coordinate system, or has no point.
-    """
-    rows: list[tuple[str, list[float], int]] = []
-    others = broken = 0
-    for at, one in enumerate(_features(parse_json(data, path, plain=False)), 1):
-        for geometry in one.geometries:
-            parts = _parts(geometry, "Point") if isinstance(geometry.value, dict) else []
-            others += parts is None
-            broken += parts == []
-            for part in parts or ():
-                given = part.value[:3] if isinstance(part.value, list) else []
-                broken += len(given) < 2
-                place = [*map(finite, given), np.nan][:3]
-                rows += [(one.name, place, at)] if len(given) > 1 else []
-    if not rows:
-        what = f"has {others} other geometries and no point" if others else "has no point"
-        raise WildlabError(what, "give a feature with a point for each mark", file=path)
-    longitude, latitude, height = np.array([place for _, place, _ in rows], float).T
-    columns = {
-        "name": [name for name, _, _ in rows],
-        "longitude_deg": longitude,
-        "latitude_deg": latitude,
-        "height_ellipsoid_m": height,
+
+def geojson_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
+    """Points of features; errors as of `kml_decode`."""
+    return _marks(path, data, "height_ellipsoid_m")
+
+
+def _marks(path: Path, data: bytes, height: str) -> Decoded:
+    found, others = read_places(data, path)
+    points = [one for one in found if one.is_point]
+    others += len(found) - len(points)
+    if not points:
+        problem = f"has no point, and {others} lines or areas"
+        raise WildlabError(problem, "give a point for each mark", file=path)
+    longitude, latitude, high = np.array([one.rings[0][0] for one in points]).T
+    columns = {"name": [one.name for one in points], "longitude_deg": longitude, "latitude_deg": latitude}
+    known = np.isfinite(high)
+    notes = {
+        "heights count from the ellipsoid, as the standard of GeoJSON has them": (
+            height == "height_ellipsoid_m" and known.any()
+        ),
+        f"{int((~known).sum())} of {len(known)} points have no height above sea level: write "
+        "<altitudeMode>absolute</altitudeMode> before <coordinates>, or give a table": (
+            height == "height_sea_m" and not known.all()
+        ),
     }
-    lost = [
-        (others, "geometry", "besides: only points are marks"),
-        (broken, "feature", "without a geometry that can be read"),
-    ]
-    said = ["heights count from the ellipsoid, as the standard of GeoJSON has them"]
-    return _decoded(
-        columns, [at for _, _, at in rows], "feature", lost, said if np.isfinite(height).any() else []
-    )
+    lost = [(others, "geometry", "besides: only points are marks")]
+    return _decoded(columns | {height: high}, [one.row for one in points], "feature", lost, holding(notes))
 
 
 #: Headings by what they mean, as `plain` has them: data/headings.toml.
