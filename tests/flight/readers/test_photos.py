@@ -17,12 +17,10 @@ from scipy.spatial.transform import Rotation
 from tests.flight.readers import made_up_photos as made
 from tests.flight.readers.tracks import near
 from wildlab.errors import WildlabError
-from wildlab.flight.readers import photo_tags
-from wildlab.flight.readers import photo_tags as values
+from wildlab.flight.readers import photos
 from wildlab.flight.readers.formats import read_folder
 from wildlab.flight.readers.log import RawLog
-from wildlab.flight.readers.photo_tags import from_nadir
-from wildlab.flight.readers.photos import camera_of, is_photos
+from wildlab.flight.readers.photos import camera_of, from_nadir, is_photos
 
 NOON = datetime(2024, 6, 12, 11, 30, tzinfo=UTC).timestamp()
 
@@ -77,11 +75,11 @@ def test_rtk_has_its_height_above_the_ellipsoid_its_spread_and_fix(tmp_path):
 )
 def test_hemispheres_and_sides_of_heights(latitude, longitude, side):
     gps = made.gps_of(latitude, longitude, 12.5, ref=side[0])
-    tags = photo_tags.Tags(exif={ExifTags.GPSTAGS[number]: value for number, value in gps.items()})
-    found = values.place_of(tags)
+    tags = photos.Tags(exif={ExifTags.GPSTAGS[number]: value for number, value in gps.items()})
+    found = photos.place_of(tags)
     if abs(latitude) + abs(longitude) > 1e-6:
         assert found[:2] == pytest.approx((latitude, longitude), abs=1e-9)
-    heights = dict(zip(("ellipsoid", "sea", "home"), values.heights_of(tags), strict=True))
+    heights = dict(zip(("ellipsoid", "sea", "home"), photos.heights_of(tags), strict=True))
     assert heights[side[2]] == 12.5 * side[1]
     assert sum(map(math.isfinite, heights.values())) == 1
 

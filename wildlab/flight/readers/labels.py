@@ -28,7 +28,7 @@ from wildlab.errors import WildlabError
 from wildlab.flight.files import check_model, leaves_folder, printable, read_regular, unreadable
 from wildlab.flight.readers.frames.image import SUFFIXES
 from wildlab.flight.readers.log import Decoded, Mask, Readings, holding, named
-from wildlab.flight.readers.photo_tags import read_tags, size_of
+from wildlab.flight.readers.photos import read_tags, size_of
 from wildlab.flight.readers.text import (
     Identity,
     Real,
