@@ -1,21 +1,18 @@
-"""MAVLink telemetry log (``.tlog``): what a ground station received, each frame behind its time of receipt.
+"""MAVLink telemetry log (``.tlog``): what a ground station received, each frame behind its time of receipt,
+by pymavlink (dialect ardupilotmega 2.0, which holds the common messages).
 
-A time of receipt is eight bytes, big end first, us since 1970. Which messages there are, their fields and
-what goes into their checksums is pymavlink's knowledge (dialect ardupilotmega 2.0, which holds the common
-messages); walking and decoding is done here, because decoding each message into an object takes several
-times longer.
-
-The ground station stamps what it receives, late by up to seconds; the vehicle stamps what it measures,
-since it was switched on. What goes with what is fitted along the lower edge of the receipts
-(`wildlab.flight.clock_fitting`), or, where the vehicle knows UTC, on what it says itself (``SYSTEM_TIME``).
-One vehicle is read, that which sent most attitudes; ground stations and other vehicles are named in the
-notes.
+A time of receipt is eight bytes, big end first, us since 1970. The ground station stamps what it receives,
+late by up to seconds; the vehicle stamps what it measures, since it was switched on. What goes with what is
+fitted along the lower edge of the receipts (`wildlab.flight.clock_fitting`), or, where the vehicle knows UTC,
+on what it says itself (``SYSTEM_TIME``). One vehicle is read, that which sent most attitudes; ground stations
+and other vehicles are named in the notes.
 """
 
 from __future__ import annotations
 
 import re
 from collections import Counter
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -67,33 +64,39 @@ VERSIONS = (0xFE, 0xFD)
 _SIGNED, _SIGNATURE = 0x01, 13
 #: A stamp begins with 0 for two thousand years yet, and the ninth byte begins a frame.
 _BEGINNING = re.compile(rb"\x00(?=[\x00-\xff]{7}[\xfd\xfe])", re.DOTALL)
+#: What is kept of each message beside its fields.
+_HEAD = ("received_s", "system", "component")
+#: Messages of use.
+KINDS = frozenset(
+    {
+        *("HEARTBEAT", "STATUSTEXT", "AUTOPILOT_VERSION", "SYSTEM_TIME"),
+        *("ATTITUDE", "GLOBAL_POSITION_INT", "LOCAL_POSITION_NED", "GPS_RAW_INT"),
+        *("HIGHRES_IMU", "SCALED_IMU", "SCALED_IMU2", "RAW_IMU"),
+        *("CAMERA_FEEDBACK", "CAMERA_TRIGGER", "GIMBAL_DEVICE_ATTITUDE_STATUS", "MOUNT_ORIENTATION"),
+    }
+)
 
-_TYPES = {
-    **{f"{kind}{bits}_t": f"<{kind[0]}{bits // 8}" for kind in ("int", "uint") for bits in (8, 16, 32, 64)},
-    "float": "<f4",
-    "double": "<f8",
-}
 
+class Telemetry(NamedTuple):
+    """Sound frames of a log.
 
-_COLUMNS = ("number", "message", "system", "component", "at", "size")
-
-
-class MavlinkFrames(NamedTuple):
-    """Sound frames of known messages in the order of the file; `data` is the whole file.
-
-    `table`: (N,) of `received_s` (s since 1970), `number` (which frame of the file it is, from 1), `message`,
-    `system`, `component`, `at` and `size` of the payload. `damaged`: frames with a wrong checksum. `unknown`:
-    message -> frames of it. `skipped`: bytes between frames, in so many `places`. `rest`: bytes of a last
-    frame that is cut.
+    `kinds`: messages of `KINDS` by name. `systems`: everybody who sent anything. `sound`: how many frames.
+    `lost`: as `Decoded` has it.
     """
 
-    data: bytes
-    table: NDArray[Any]
-    damaged: int
-    unknown: dict[int, int]
-    skipped: int
-    places: int
-    rest: int
+    kinds: dict[str, Messages]
+    systems: set[int]
+    sound: int
+    lost: list[tuple[int, str, str]]
+
+    def of(self, name: str, system: int | None = None, component: int | None = None) -> Messages:
+        """Messages of one kind, from whom; None: from all."""
+        nothing = Messages(name, dict.fromkeys(_HEAD, np.zeros(0)), np.zeros(0, np.int64))
+        found = self.kinds.get(name, nothing)
+        chosen = np.ones(len(found), bool)
+        for field, value in (("system", system), ("component", component)):
+            chosen &= (found.fields[field] == value) | (value is None)
+        return found.take(chosen)
 
 
 def _dialect() -> Any:
@@ -113,43 +116,62 @@ def names(enumeration: str, value: int) -> str:
     return "" if entry is None else entry.name.removeprefix(enumeration + "_").replace("_", " ").lower()
 
 
-def walk(data: bytes) -> MavlinkFrames:
+def walk(data: bytes) -> Telemetry:
     """All frames of a telemetry log, or of its beginning; none where it is no such log."""
     dialect = _dialect()
-    checksum = dialect.x25crc
-    extra = {key: bytes([one.crc_extra]) for key, one in dialect.mavlink_map.items()}
-    rows: list[tuple[float, int, int, int, int, int, int]] = []
-    unknown: Counter[int] = Counter()
-    damaged = skipped = places = number = pos = covered = 0
-    length = len(data)
-    while pos + 16 <= length:
-        end, message, system, component, payload = _header(data, pos)
-        whole = 0 < end <= length and _plausible(data, pos)
-        known = message in extra
-        sound = False
-        if whole and known:
-            tail = data[pos + 9] + payload
-            found = checksum(data[pos + 9 : tail] + extra[message]).crc
-            sound = found == data[tail] | data[tail + 1] << 8
-        if not sound and not (whole and _begins(data, end)):
+    library = dialect.MAVLink(None)
+    rows: dict[str, list[tuple[Any, ...]]] = {}
+    systems: set[int] = set()
+    bad = skipped = places = number = sound = pos = covered = 0
+    while pos + 16 <= len(data):
+        end = _end(data, pos)
+        message = None
+        if pos < end <= len(data) and _plausible(data, pos):
+            with suppress(dialect.MAVError):
+                message = library.decode(bytearray(data[pos + 8 : end]))
+        known = message is not None and message.get_msgId() in dialect.mavlink_map
+        if not known and not (pos < end <= len(data) and _plausible(data, pos) and _begins(data, end)):
             next_ = _BEGINNING.search(data, pos + 1)
             if next_ is None:
                 break
             pos = next_.start()
             continue
         number += 1
-        if sound:
-            stamp = int.from_bytes(data[pos : pos + 8], "big")
-            rows.append((stamp / 1e6, number, message, system, component, payload, data[pos + 9]))
-        elif known:
-            damaged += 1
+        if message is None or not known:
+            bad += 1
         else:
-            unknown[message] += 1
+            sound += 1
+            name, system = message.get_type(), message.get_srcSystem()
+            systems.add(system)
+            if name in KINDS:
+                received_s = int.from_bytes(data[pos : pos + 8], "big") / 1e6
+                values = (getattr(message, field) for field in message.fieldnames)
+                row = (number, received_s, system, message.get_srcComponent(), *values)
+                rows.setdefault(name, []).append(row)
         if pos > covered:
             skipped, places = skipped + pos - covered, places + 1
         pos = covered = end
-    table = np.array(rows, [("received_s", "f8"), *((name, "i8") for name in _COLUMNS)])
-    return MavlinkFrames(data, table, damaged, dict(unknown), skipped, places, length - covered)
+    fields = {one.msgname: one.fieldnames for one in dialect.mavlink_map.values()}
+    kinds = {name: _messages(name, fields[name], found) for name, found in rows.items()}
+    lost = [
+        (bad, "frame", f"damaged or of kinds that are not known, {sound} are read"),
+        (skipped, "byte", f"of {len(data)} in {places} places are no frames"),
+        (len(data) - covered, "byte", f"of {len(data)} at the end: it ends within a frame"),
+    ]
+    return Telemetry(kinds, systems, sound, lost)
+
+
+def _messages(name: str, fields: list[str], rows: list[tuple[Any, ...]]) -> Messages:
+    number, *values = zip(*rows, strict=True)
+    found: dict[str, Any] = {}
+    for field, column in zip((*_HEAD, *fields), values, strict=True):
+        several = np.asarray(column)
+        found |= (
+            {field: several}
+            if several.ndim == 1
+            else {f"{field}[{i}]": one for i, one in enumerate(several.T)}
+        )
+    return Messages(name, found, np.array(number, np.int64))
 
 
 def _begins(data: bytes, at: int) -> bool:
@@ -157,66 +179,13 @@ def _begins(data: bytes, at: int) -> bool:
     return len(data) - at <= 8 or (data[at] == 0 and data[at + 8] in VERSIONS)
 
 
-def _header(data: bytes, pos: int) -> tuple[int, int, int, int, int]:
-    """End of the frame (0: none is here), message, system, component, start of the payload."""
-    size = data[pos + 9]
+def _end(data: bytes, pos: int) -> int:
+    """End of the frame; 0 where none is here."""
     if data[pos + 8] == VERSIONS[0]:
-        return pos + 16 + size, data[pos + 13], data[pos + 11], data[pos + 12], pos + 14
-    if data[pos + 8] == VERSIONS[1] and pos + 18 <= len(data) and not data[pos + 10] & ~_SIGNED:
-        signature = _SIGNATURE if data[pos + 10] & _SIGNED else 0
-        message = data[pos + 15] | data[pos + 16] << 8 | data[pos + 17] << 16
-        return pos + 20 + size + signature, message, data[pos + 13], data[pos + 14], pos + 18
-    return 0, -1, 0, 0, pos
-
-
-def messages(
-    frames: MavlinkFrames, name: str, system: int | None = None, component: int | None = None
-) -> Messages:
-    """Messages of one kind, with `received_s`, `system` and `component` beside their own fields.
-
-    Parameters
-    ----------
-    frames
-        Of `walk`.
-    name
-        As MAVLink calls it: ``"ATTITUDE"``.
-    system, component
-        From whom; None: from all.
-
-    Returns
-    -------
-    Messages
-        Fields that the sender left away (zeros at the end, extensions) are zero, as the format wants it.
-    """
-    table = frames.table
-    kind = next((one for one in _dialect().mavlink_map.values() if one.msgname == name), None)
-    chosen = table["message"] == (-1 if kind is None else kind.id)
-    for field, value in (("system", system), ("component", component)):
-        chosen &= table[field] == (table[field] if value is None else value)
-    table = table[chosen]
-    fields: dict[str, Any] = {one: table[one] for one in ("received_s", "system", "component")}
-    if kind is not None:
-        types = dict(zip(kind.fieldnames, kind.fieldtypes, strict=True))
-        counts = zip(kind.ordered_fieldnames, kind.array_lengths, strict=True)
-        dtype = np.dtype([_field(one, types[one], many) for one, many in counts])
-        width, data = dtype.itemsize, frames.data
-        spans = zip(table["at"].tolist(), table["size"].tolist(), strict=True)
-        joined = b"".join([data[a : a + min(n, width)].ljust(width, b"\0") for a, n in spans])
-        found = np.frombuffer(joined, dtype)
-        for one in dtype.names or ():
-            several = found[one].ndim > 1
-            fields |= (
-                {f"{one}[{i}]": found[one][:, i] for i in range(found[one].shape[1])}
-                if several
-                else {one: found[one]}
-            )
-    return Messages(name, fields, table["number"])
-
-
-def _field(name: str, kind: str, many: int) -> tuple[Any, ...]:
-    if kind == "char":
-        return name, f"S{max(many, 1)}"
-    return (name, _TYPES[kind], (many,)) if many else (name, _TYPES[kind])
+        return pos + 16 + data[pos + 9]
+    if data[pos + 8] == VERSIONS[1] and not data[pos + 10] & ~_SIGNED:
+        return pos + 20 + data[pos + 9] + (_SIGNATURE if data[pos + 10] & _SIGNED else 0)
+    return 0
 
 
 DAY_S = 86400.0
@@ -251,9 +220,9 @@ class Boot(NamedTuple):
             return utc, np.abs(found.get("received_s") - self.behind_s[run] - utc) < BESIDE_S
 
 
-def find_boot(frames: MavlinkFrames, system: int, component: int) -> Boot | None:
+def find_boot(frames: Telemetry, system: int, component: int) -> Boot | None:
     """The clock of an autopilot; None where nothing that it sent has a stamp."""
-    kinds = {name: messages(frames, name, system, component) for name in _STAMPED}
+    kinds = {name: frames.of(name, system, component) for name in _STAMPED}
     number = np.concatenate([one.rows for one in kinds.values()])
     order = np.argsort(number, kind="stable")
     own = np.concatenate([one.get("time_boot_ms") for one in kinds.values()])[order] / 1e3
@@ -308,18 +277,18 @@ def find_boot(frames: MavlinkFrames, system: int, component: int) -> Boot | None
 class Vehicle(NamedTuple):
     """Messages of one vehicle: its frames, its numbers, and its clock, None where nothing has a stamp."""
 
-    frames: MavlinkFrames
+    frames: Telemetry
     system: int
     component: int
     boot: Boot | None
 
     def own(self, name: str) -> Messages:
         """Messages of its autopilot."""
-        return messages(self.frames, name, self.system, self.component)
+        return self.frames.of(name, self.system, self.component)
 
     def any(self, name: str) -> Messages:
         """Messages of all its components: cameras and gimbals may be such."""
-        return messages(self.frames, name, self.system)
+        return self.frames.of(name, self.system)
 
     def readings(
         self, found: Messages, field: str, columns: dict[str, Array], unusable: dict[str, Mask] | None = None
@@ -352,9 +321,7 @@ def _most(rows: Mask) -> bool:
 def sniff(head: bytes) -> bool:
     """Whether a sound frame behind a time that can be true is among the first bytes of a file."""
     # Without the look at times, all that it takes to walk would be loaded for any file.
-    return (
-        any(_plausible(head, one.start()) for one in _BEGINNING.finditer(head)) and len(walk(head).table) > 0
-    )
+    return any(_plausible(head, one.start()) for one in _BEGINNING.finditer(head)) and walk(head).sound > 0
 
 
 def decode(path: Path, data: bytes, zone: str | None) -> Decoded:
@@ -366,8 +333,7 @@ def decode(path: Path, data: bytes, zone: str | None) -> Decoded:
         Where it holds no sound frame, or no vehicle.
     """
     frames = walk(data)
-    sound = len(frames.table)
-    if not sound:
+    if not frames.sound:
         raise WildlabError(
             "holds no sound MAVLink frame behind a time of receipt",
             "give the .tlog that the ground station wrote",
@@ -376,7 +342,7 @@ def decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     vehicles, stations = _systems(frames)
     if not vehicles:
         raise WildlabError(
-            f"holds {sound} messages, and none of attitude or position",
+            f"holds {frames.sound} messages, and none of attitude or position",
             "give the log of the flight itself",
             file=path,
         )
@@ -389,26 +355,18 @@ def decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     if stations:
         said = ", ".join(map(str, sorted(stations)))
         notes = [*notes, f"left out as no vehicles: system {said}"]
-    kinds = ", ".join(str(one) for one in sorted(frames.unknown)[:8])
-    more = f" and {len(frames.unknown) - 8} more" if len(frames.unknown) > 8 else ""
-    lost = [
-        (frames.damaged, "frame", f"with a wrong checksum, {sound} are read"),
-        (frames.skipped, "byte", f"of {len(data)} in {frames.places} places are no frames"),
-        (frames.rest, "byte", f"of {len(data)} at the end: it ends within a frame"),
-        (sum(frames.unknown.values()), "message", f"of kinds that are not known (numbers {kinds}{more})"),
-    ]
     clock, before = (vehicle.boot.clock, vehicle.boot.notes) if vehicle.boot else (None, [])
-    return Decoded(parts, _called(vehicle), clock, lost, [*before, *notes])
+    return Decoded(parts, _called(vehicle), clock, frames.lost, [*before, *notes])
 
 
-def _systems(frames: MavlinkFrames) -> tuple[list[tuple[int, int]], set[int]]:
+def _systems(frames: Telemetry) -> tuple[list[tuple[int, int]], set[int]]:
     """(system, component) of the autopilots, the busiest first, and systems that are none."""
-    beats = messages(frames, "HEARTBEAT")
+    beats = frames.of("HEARTBEAT")
     no = (beats.get("autopilot") == _NO_AUTOPILOT) | (beats.get("type") == _GROUND_STATION)
     known, autopilots = set(_senders(beats)), set(_senders(beats.take(~no)))
     counts: dict[tuple[int, int], tuple[int, ...]] = {}
     for place, name in enumerate(_FLIES):
-        for one, count in Counter(_senders(messages(frames, name))).items():
+        for one, count in Counter(_senders(frames.of(name))).items():
             if one in autopilots or one not in known:
                 had = counts.get(one, (0,) * len(_FLIES))
                 counts[one] = (*had[:place], count, *had[place + 1 :])
@@ -417,8 +375,7 @@ def _systems(frames: MavlinkFrames) -> tuple[list[tuple[int, int]], set[int]]:
     first: dict[int, tuple[int, int]] = {}
     for one in order:
         first.setdefault(one[0], one)
-    everyone = set(np.unique(frames.table["system"]).tolist())
-    return list(first.values()), everyone - set(first)
+    return list(first.values()), frames.systems - set(first)
 
 
 def _senders(found: Messages) -> list[tuple[int, int]]:
