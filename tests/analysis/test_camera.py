@@ -11,8 +11,8 @@ from wildlab.analysis.camera import (
     solve_boards,
 )
 from wildlab.detection.boards import Board
-from wildlab.geometry.board_views import Views, parameters_of, project_board
 from wildlab.geometry.camera import Camera
+from wildlab.geometry.intrinsics import Views, project_board
 from wildlab.simulation.boards import board_views
 
 CAMERA = Camera(640, 512, 1159.2, 1167.8, 313.0, 265.0, 0.0, (-0.2, 0.0, 0.0, 0.0, 0.0))
@@ -22,7 +22,7 @@ BOARD = Board("chessboard", 9, 6, 0.025)
 def images(n=20, noise=0.1, tilt=40.0, seed=1):
     rng = np.random.default_rng(seed)
     views: Views = board_views(rng, CAMERA, BOARD.points, n, np.radians(tilt))
-    uv = project_board(parameters_of(CAMERA), views, BOARD.points).uv
+    uv = project_board(CAMERA, views, BOARD.points)
     uv = uv + rng.normal(0, noise, uv.shape)
     return tuple(BoardImage(f"{i}.png", "", one) for i, one in enumerate(uv))
 

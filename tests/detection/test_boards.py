@@ -6,9 +6,9 @@ import pytest
 
 from wildlab.detection import boards
 from wildlab.detection.boards import Board, find_board, grey8
-from wildlab.geometry.board_views import Views, parameters_of, project_board
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import euler_to_matrix
+from wildlab.geometry.intrinsics import Views, project_board
 from wildlab.simulation.boards import board_image
 
 CAMERA = Camera(320, 256, 420.0, 424.0, 156.0, 131.0, 0.0, (-0.15, 0.1, 0.0, 0.0, 0.0))
@@ -38,7 +38,7 @@ def image(board, rng, warm, cold):
 def test_points_lie_where_they_are_whichever_side_is_warm(board, warm, cold):
     seen = find_board(grey8(image(board, np.random.default_rng(1), warm, cold)), board)
     R, t = pose(board)
-    true = project_board(parameters_of(CAMERA), Views(R[None], t[None]), board.points).uv[0]
+    true = project_board(CAMERA, Views(R[None], t[None]), board.points)[0]
     # Which corner is the first is not to be told on a symmetric board.
     error = min(np.abs(seen.uv - order).max() for order in (true, true[::-1]))
     assert error < 0.35
@@ -84,7 +84,7 @@ def test_corners_are_where_edges_cross():
         rng = np.random.default_rng(seed)
         clean = board_image(CAMERA, R, t, board.points, board.spacing, warm=200.0, cold=50.0)
         grey = grey8(cv2.GaussianBlur(clean, (0, 0), 0.6) + rng.normal(0, 2, clean.shape))
-        true = project_board(parameters_of(CAMERA), Views(R[None], t[None]), board.points).uv[0]
+        true = project_board(CAMERA, Views(R[None], t[None]), board.points)[0]
         found = true + rng.normal(0, 0.4, true.shape)
         refined = boards._refined(found, grey, board)
         errors["found"].append(found - true)

@@ -17,11 +17,9 @@ from wildlab.errors import WildlabError
 from wildlab.flight.calibration_files import BoardPart, CameraFile, EvidencePart, ParameterPart, ViewPart
 from wildlab.flight.manifest_parts import CameraPart
 from wildlab.flight.readers.frames.image import file_name, read_image
-from wildlab.geometry.board_views import parameters_of
 from wildlab.geometry.frames import Array, Mask
 from wildlab.geometry.intrinsics import (
     FEWEST,
-    LENSES,
     PINHOLE,
     Intrinsics,
     LensChoice,
@@ -29,6 +27,7 @@ from wildlab.geometry.intrinsics import (
     choose_lens,
     confused,
     direction_sd,
+    parameters_of,
     view_errors,
 )
 from wildlab.names import listed
@@ -203,17 +202,14 @@ def solve_boards(
     used = [one for one in images if one.uv is not None and not one.problem]
     points, uv = board.points / board.spacing, np.array([one.uv for one in used])
     choice = choose_lens(points, uv, width, height) if lens == "auto" else LensChoice(lens, {})
-    pinhole = ("f", "cx", "cy") if square_pixels else PINHOLE
-    estimate = (*pinhole, *LENSES[choice.lens])
-
-    found = calibrate_camera(points, uv, width, height, estimate)
+    found = calibrate_camera(points, uv, width, height, choice.lens, square_pixels)
     held_out = held_out_errors(found, points, uv)
     odd, rest = np.zeros(len(uv), bool), None
     errors = held_out
     # One at a time, the worst first: a view that is wrong pulls the camera away from others too.
     while odd.sum() < _most_odd(len(uv)) and (wrong := odd_views(errors)).any():
         odd[np.flatnonzero(~odd)[np.where(wrong, errors, -np.inf).argmax()]] = True
-        rest = calibrate_camera(points, uv[~odd], width, height, estimate)
+        rest = calibrate_camera(points, uv[~odd], width, height, choice.lens, square_pixels)
         errors = held_out_errors(rest, points, uv[~odd])
     names = tuple(one.name for one, is_odd in zip(used, odd, strict=True) if is_odd)
     return CameraCalibration(board, width, height, images, choice, found, held_out, names, rest)
@@ -300,8 +296,7 @@ def camera_file(found: CameraCalibration, name: str) -> CameraFile:
     CameraFile
     """
     k = found.found
-    theta = dict(zip(("fx", "fy", "cx", "cy", "skew"), parameters_of(k.camera)[:5].tolist(), strict=True))
-    bends = dict(zip(("k1", "k2", "p1", "p2", "k3"), k.camera.distortion, strict=True))
+    theta = parameters_of(k.camera)
     parameters = []
     for one in k.names:
         low, high = k.interval(one)
@@ -311,8 +306,7 @@ def camera_file(found: CameraCalibration, name: str) -> CameraFile:
             name=name,
             width_px=found.width,
             height_px=found.height,
-            **{f"{key}_px": value for key, value in theta.items()},
-            **bends,
+            **{f"{key}_px" if key in PINHOLE else key: value for key, value in theta.items()},
         ),
         board=BoardPart(
             pattern=found.board.pattern,
@@ -394,7 +388,7 @@ ROUGH_PX = 2.0
 #: Names as a reader knows them.
 WORDS = {
     "f": "the focal length", "fx": "the focal length of columns", "fy": "the focal length of rows",
-    "cx": "the principal point's column", "cy": "the principal point's row", "skew": "the skew",
+    "cx": "the principal point's column", "cy": "the principal point's row",
 }  # fmt: skip
 
 

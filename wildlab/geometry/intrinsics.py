@@ -1,36 +1,26 @@
 """Intrinsic parameters of a camera from views of a flat board (H 2.5.1, F 2.4), with what they are worth.
 
-Zhang's method: homographies give a start, and Levenberg and Marquardt bring camera and views together to the
-least squared distance in the image. How good the estimate is follows from the views themselves: each is left
-out in turn, and the estimate moves. Corners of one view share errors (blur, a warped board), so that their
-number says less than the number of views.
+OpenCV estimates camera and views together (Zhang's method). How good the estimate is follows from the views
+themselves: each is left out in turn, and the estimate moves. Corners of one view share errors (blur, a warped
+board), so that their number says less than the number of views.
+
+The board lies in its own frame, z = 0. A view is a pose that takes a point of the board to c.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import stdtrit
 
 from wildlab.errors import WildlabError
-from wildlab.geometry.board_views import (
-    INTRINSICS,
-    Views,
-    camera_of,
-    parameters_of,
-    project_board,
-    start_camera,
-    start_views,
-)
-from wildlab.geometry.camera import Camera, normalise
-from wildlab.geometry.frames import Array, rotation_vector_to_matrix
+from wildlab.geometry.camera import Camera, normalise, project
+from wildlab.geometry.frames import Array
 
-#: What may be estimated: each intrinsic parameter, or "f", one focal length for columns and rows.
-ESTIMATED = ("f", *INTRINSICS)
 #: The pinhole, and lenses that bend more and more.
 PINHOLE = ("fx", "fy", "cx", "cy")
 LENSES: dict[str, tuple[str, ...]] = {
@@ -41,16 +31,49 @@ LENSES: dict[str, tuple[str, ...]] = {
     "tangential": ("k1", "k2", "p1", "p2"),
     "full": ("k1", "k2", "p1", "p2", "k3"),
 }
-#: Fewest views of an estimate whose uncertainty can be told by leaving one out.
-FEWEST = 4
-#: Steps of an estimate, at most; of one that begins near its end; and which gain is too small to go on, as a
-#: share of the summed squares.
-ROUNDS, AGAIN, SETTLED = 200, 20, 1e-10
-#: How much an estimate is damped at first, far from its end and near it.
-FAR, NEAR = 1e-3, 1e-9
+#: Columns of OpenCV's derivatives, behind six of the pose; "f" is one focal length for columns and rows.
+_COLUMNS = {name: (6 + i,) for i, name in enumerate((*PINHOLE, *LENSES["full"]))} | {"f": (6, 7)}
+#: What holds a parameter of the lens.
+_HELD = {
+    "k1": cv2.CALIB_FIX_K1,
+    "k2": cv2.CALIB_FIX_K2,
+    "p1": cv2.CALIB_ZERO_TANGENT_DIST,
+    "k3": cv2.CALIB_FIX_K3,
+}
+#: Fewest views of an estimate whose uncertainty can be told by leaving one out, and points of a view.
+FEWEST, POINTS = 4, 6
+#: When an estimate stops: steps, and a change of that share of the parameters.
+STOP = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 200, 1e-12)
 #: Smallest singular value of the normalised derivatives of parameters that views tell apart: 0.1 is two
 #: parameters with a correlation of 0.99.
 PARALLEL = 0.1
+
+
+class Views(NamedTuple):
+    """Poses of V views of a board: ``rotation`` (V, 3, 3) and ``translation`` (V, 3), from the board to c."""
+
+    rotation: Array
+    translation: Array
+
+
+def project_board(camera: Camera, views: Views, board: ArrayLike) -> Array:
+    """The board's points in each view, F (2.20).
+
+    Parameters
+    ----------
+    camera
+        Its intrinsic parameters.
+    views
+        Poses of the board.
+    board
+        (M, 3) in the frame of the board.
+
+    Returns
+    -------
+    (V, M, 2) pixels; NaN for points in or behind the plane of the lens.
+    """
+    turned = np.einsum("vij,mj->vmi", views.rotation, np.asarray(board, float))
+    return project(camera, turned + views.translation[:, None])
 
 
 @dataclass(frozen=True)
@@ -62,7 +85,7 @@ class Intrinsics:
     camera
         The estimate.
     names
-        The P parameters estimated, some of `ESTIMATED`; the others were held.
+        The P parameters estimated: of `PINHOLE` (or "f" for one focal length) and of one of `LENSES`.
     values
         (P,) pixels, or no unit.
     covariance
@@ -98,15 +121,11 @@ class Intrinsics:
 
     def camera_with(self, values: ArrayLike) -> Camera:
         """The camera with other values (P,) of what was estimated."""
-        free = free_columns(self.names)
-        theta = np.where(free.any(axis=1), free @ np.asarray(values, float), parameters_of(self.camera))
-        return camera_of(theta, self.camera.width, self.camera.height)
+        return _camera(dict(zip(self.names, np.asarray(values, float).tolist(), strict=True)), self.camera)
 
     def value(self, name: str) -> float:
-        """The estimate called ``name``; what it was held at where it was not estimated."""
-        if name in self.names:
-            return float(self.values[self.names.index(name)])
-        return float(parameters_of(self.camera)[INTRINSICS.index("fx" if name == "f" else name)])
+        """The estimate called ``name``; zero where it was held."""
+        return float(self.values[self.names.index(name)]) if name in self.names else 0.0
 
     def sd(self, name: str) -> float:
         """Its standard deviation; NaN where it was held."""
@@ -121,13 +140,37 @@ class Intrinsics:
         return self.value(name) - half, self.value(name) + half
 
 
+def parameters_of(camera: Camera) -> dict[str, float]:
+    """The intrinsic parameters of a camera by the names of `PINHOLE` and `LENSES`.
+
+    Parameters
+    ----------
+    camera
+        Its skew is not among them: no lens here has any.
+
+    Returns
+    -------
+    dict
+        Pixels, or no unit.
+    """
+    values = (camera.fx, camera.fy, camera.cx, camera.cy, *camera.distortion)
+    return dict(zip((*PINHOLE, *LENSES["full"]), values, strict=True))
+
+
+def _camera(values: dict[str, float], like: Camera) -> Camera:
+    """A camera of the same size with these parameters; without distortion where they name none."""
+    fx, fy = (values["f"], values["f"]) if "f" in values else (values["fx"], values["fy"])
+    k1, k2, p1, p2, k3 = (values.get(name, 0.0) for name in LENSES["full"])
+    return Camera(like.width, like.height, fx, fy, values["cx"], values["cy"], 0.0, (k1, k2, p1, p2, k3))
+
+
 def calibrate_camera(
     board: ArrayLike,
     uv: ArrayLike,
     width: int,
     height: int,
-    estimate: Sequence[str] = (*PINHOLE, *LENSES["full"]),
-    held: Camera | None = None,
+    lens: str = "full",
+    square_pixels: bool = False,
     resample: bool = True,
 ) -> Intrinsics:
     """Estimate a camera from views of a flat board.
@@ -140,10 +183,10 @@ def calibrate_camera(
         (V, M, 2) their pixels; NaN where one is not seen.
     width, height
         Of the image, pixels.
-    estimate
-        Which parameters, some of `ESTIMATED`; "f" stands for fx = fy.
-    held
-        What the others are held at; left out, no skew, no distortion and the middle of the image.
+    lens
+        One of `LENSES`: what is estimated of its distortion.
+    square_pixels
+        Whether columns and rows have one focal length.
     resample
         Whether each view is left out in turn, for the covariance; else that is NaN.
 
@@ -154,53 +197,37 @@ def calibrate_camera(
     Raises
     ------
     WildlabError
-        Where there are fewer than four views, a view has fewer than six points, the shapes do not fit, a
-        parameter is not known, or no camera fits the views.
+        Where there are fewer than four views, a view has fewer than six points, the shapes do not fit, or no
+        camera fits the views.
 
     Examples
     --------
-    >>> from wildlab.geometry.board_views import Views, project_board
     >>> from wildlab.geometry import euler_to_matrix
     >>> board = np.array([[x, y, 0.0] for y in range(5) for x in range(7)])
     >>> tilts = np.radians([[0, 20, 0], [20, 0, 30], [-25, 10, 0], [0, -25, 60], [15, 15, 10]])
     >>> views = Views(euler_to_matrix(*tilts.T), np.tile([-3.0, -2.0, 14.0], (5, 1)))
-    >>> uv = project_board([900, 905, 310, 250, 0, 0.1, 0, 0, 0, 0], views, board).uv
-    >>> found = calibrate_camera(board, uv, 640, 512, ("fx", "fy", "cx", "cy", "k1"))
+    >>> seen = Camera(640, 512, 900, 905, 310, 250, 0, (0.1, 0, 0, 0, 0))
+    >>> found = calibrate_camera(board, project_board(seen, views, board), 640, 512, "k1")
     >>> [round(float(value), 3) for value in found.values]
     [900.0, 905.0, 310.0, 250.0, 0.1]
     """
     board, uv = np.asarray(board, float), np.asarray(uv, float)
-    names = _checked(board, uv, estimate)
-    first = start_camera(board, uv, width, height)
-    free = free_columns(names)
-    begin = parameters_of(first)
-    if held is not None:
-        kept = [i for i in range(len(INTRINSICS)) if not free[i].any()]
-        begin[kept] = parameters_of(held)[kept]
-    if "f" in names:
-        begin[:2] = begin[:2].mean()
-    views = start_views(camera_of(begin, width, height), board, uv)
-    theta, views = _solve(begin, views, board, uv, free)
-    if not np.isfinite(theta).all() or not (theta[:2] > 0).all():
-        raise WildlabError(
-            "no camera fits these views",
-            "check that all views are of one camera with one zoom and one focus, and that the board's "
-            "columns and rows are right",
-        )
-    r, J, K = _linear(theta, views, board, uv, free)
-    information = _reduced(J, K)
-    without = np.full((len(uv), len(theta)), np.nan)
+    _check(board, uv)
+    names = (*(("f", *PINHOLE[2:]) if square_pixels else PINHOLE), *LENSES[lens])
+    camera, views = _solve(board, uv, names, (width, height))
+    values = _values(camera, names)
+    seen = np.isfinite(uv).all(axis=-1)
+    information = np.array(
+        [_information(camera, R, t, board[one], names) for R, t, one in zip(*views, seen, strict=True)]
+    )
+    without = np.full((len(uv), len(names)), np.nan)
     for left in range(len(uv) if resample else 0):
-        keep = np.arange(len(uv)) != left
-        rest = Views(views.rotation[keep], views.translation[keep])
-        without[left] = _solve(theta, rest, board, uv[keep], free, AGAIN)[0]
-    pick = free / free.sum(axis=0)
-    moved = without @ pick
-    apart = moved - moved.mean(axis=0)
+        rest, _ = _solve(board, np.delete(uv, left, axis=0), names, (width, height), camera)
+        without[left] = _values(rest, names)
+    apart = without - without.mean(axis=0)
     covariance = (len(uv) - 1) / len(uv) * apart.T @ apart
-    camera = camera_of(theta, width, height)
-    r[~np.isfinite(uv).all(axis=-1)] = np.nan
-    return Intrinsics(camera, names, theta @ pick, covariance, views, r, information, moved)
+    r = project_board(camera, views, board) - uv
+    return Intrinsics(camera, names, values, covariance, views, r, information, without)
 
 
 def view_errors(camera: Camera, board: ArrayLike, uv: ArrayLike) -> Array:
@@ -220,9 +247,16 @@ def view_errors(camera: Camera, board: ArrayLike, uv: ArrayLike) -> Array:
     (V,) root mean squared distance of projected and seen points, pixels.
     """
     board, uv = np.asarray(board, float), np.asarray(uv, float)
-    theta, free = parameters_of(camera), np.zeros((len(INTRINSICS), 0))
-    _, views = _solve(theta, start_views(camera, board, uv), board, uv, free)
-    squared = ((project_board(theta, views, board).uv - uv) ** 2).sum(axis=-1)
+    bends, rotations, translations = np.array(camera.distortion), [], []
+    for one in uv:
+        seen = np.isfinite(one).all(axis=1)
+        points, pixels = np.ascontiguousarray(board[seen]), np.ascontiguousarray(one[seen])
+        _, turn, place = cv2.solvePnP(points, pixels, camera.matrix, bends)
+        turn, place = cv2.solvePnPRefineLM(points, pixels, camera.matrix, bends, turn, place, STOP)
+        rotations.append(cv2.Rodrigues(turn)[0])
+        translations.append(place.ravel())
+    views = Views(np.array(rotations), np.array(translations))
+    squared = ((project_board(camera, views, board) - uv) ** 2).sum(axis=-1)
     return np.asarray(np.sqrt(np.nanmean(squared, axis=1)))
 
 
@@ -252,18 +286,11 @@ def confused(found: Intrinsics) -> list[tuple[str, ...]]:
     return groups
 
 
-def _checked(board: Array, uv: Array, estimate: Sequence[str]) -> tuple[str, ...]:
+def _check(board: Array, uv: Array) -> None:
     if board.ndim != 2 or board.shape[1] != 3 or uv.ndim != 3 or uv.shape[1:] != (len(board), 2):
         raise WildlabError(
             f"a board of shape {board.shape} and pixels of shape {uv.shape} do not fit",
             "give the board as (M, 3) and the pixels as (V, M, 2)",
-        )
-    unknown = set(estimate) - set(ESTIMATED)
-    if unknown or ("f" in estimate and {"fx", "fy"} & set(estimate)) or not estimate:
-        raise WildlabError(
-            f"cannot estimate {', '.join(estimate) or 'nothing'} together",
-            f"name some of {', '.join(ESTIMATED)}, and f only without fx and fy",
-            field="estimate",
         )
     if len(uv) < FEWEST:
         raise WildlabError(
@@ -271,93 +298,60 @@ def _checked(board: Array, uv: Array, estimate: Sequence[str]) -> tuple[str, ...
             "take 20 or more, from all sides, tilted by up to 45 degrees, all over the image",
         )
     few = np.isfinite(uv).all(axis=-1).sum(axis=1)
-    if few.min() < 6:
+    if few.min() < POINTS:
         raise WildlabError(
-            f"view {int(few.argmin())} has {few.min()} points", "leave out views with fewer than 6"
+            f"view {int(few.argmin())} has {few.min()} points", f"leave out views with fewer than {POINTS}"
         )
-    return tuple(name for name in ESTIMATED if name in estimate)
-
-
-def free_columns(names: Sequence[str]) -> Array:
-    """From estimated parameters to all intrinsic ones: "f" goes into both focal lengths.
-
-    Parameters
-    ----------
-    names
-        The P parameters, some of `ESTIMATED`.
-
-    Returns
-    -------
-    (10, P) zeros and ones.
-    """
-    free = np.zeros((len(INTRINSICS), len(names)))
-    for column, name in enumerate(names):
-        for one in ("fx", "fy") if name == "f" else (name,):
-            free[INTRINSICS.index(one), column] = 1.0
-    return free
-
-
-def _linear(theta: Array, views: Views, board: Array, uv: Array, free: Array) -> tuple[Array, Array, Array]:
-    """Residuals (V, M, 2), derivatives (V, 2M, P) and (V, 2M, 6); zero for points that are not seen."""
-    found = project_board(theta, views, board)
-    r = found.uv - uv
-    lost = np.asarray(~np.isfinite(uv).all(axis=-1))
-    r = np.where(lost[..., None], 0.0, r)
-    J = np.where(lost[..., None, None], 0.0, found.by_intrinsics @ free)
-    K = np.where(lost[..., None, None], 0.0, found.by_pose)
-    rows = (len(uv), 2 * len(board))
-    return r, J.reshape(*rows, free.shape[1]), K.reshape(*rows, 6)
-
-
-def _reduced(J: Array, K: Array) -> Array:
-    """(V, P, P) information on the intrinsics with the pose of each view eliminated."""
-    turned = np.swapaxes(K, 1, 2)
-    cross = turned @ J
-    return np.asarray(
-        np.swapaxes(J, 1, 2) @ J - np.swapaxes(cross, 1, 2) @ np.linalg.solve(turned @ K, cross)
-    )
 
 
 def _solve(
-    theta: Array, views: Views, board: Array, uv: Array, free: Array, rounds: int = ROUNDS
-) -> tuple[Array, Views]:
-    """Camera and views of least squared distance, by Levenberg and Marquardt; the poses are eliminated."""
-    damping = FAR if rounds == ROUNDS else NEAR
-    r, J, K = _linear(theta, views, board, uv, free)
-    cost = float((r**2).sum())
-    for _ in range(rounds):
-        flat = r.reshape(len(r), -1, 1)
-        JJ, KK = np.swapaxes(J, 1, 2) @ J, np.swapaxes(K, 1, 2) @ K
-        KJ, gj, gk = (
-            np.swapaxes(K, 1, 2) @ J,
-            np.swapaxes(J, 1, 2) @ flat,
-            np.swapaxes(K, 1, 2) @ flat,
+    board: Array, uv: Array, names: tuple[str, ...], size: tuple[int, int], near: Camera | None = None
+) -> tuple[Camera, Views]:
+    """Camera and views of least squared distance; ``near`` is where to begin. OpenCV takes float32."""
+    seen = [np.isfinite(view).all(axis=1) for view in uv]
+    points = [board[one].astype(np.float32) for one in seen]
+    pixels = [view[one].astype(np.float32) for view, one in zip(uv, seen, strict=True)]
+    flags = sum(flag for name, flag in _HELD.items() if name not in names) | cv2.CALIB_USE_INTRINSIC_GUESS
+    flags |= cv2.CALIB_FIX_ASPECT_RATIO if "f" in names else 0
+    found: list[Any]
+    try:
+        start, bends = cv2.initCameraMatrix2D(points, pixels, size, int("f" in names)), np.zeros(5)
+        if near is not None:
+            start, bends = near.matrix, np.array(near.distortion)
+        _, *found = cv2.calibrateCamera(points, pixels, size, start, bends, flags=flags, criteria=STOP)
+    except cv2.error:
+        found = [np.full((3, 3), np.nan)]
+    A = np.asarray(found[0], float)
+    if not (np.isfinite(A).all() and A[0, 0] > 0 and A[1, 1] > 0):
+        raise WildlabError(
+            "no camera fits these views",
+            "check that all views are of one camera with one zoom and one focus, and that the board's "
+            "columns and rows are right",
         )
-        gained = 0.0
-        while damping < 1e12:
-            KKd = KK + damping * KK * np.eye(6)
-            solved = np.linalg.solve(KKd, np.concatenate([KJ, gk], axis=-1))
-            S = (JJ.sum(axis=0)) * (1 + damping * np.eye(J.shape[-1])) - (
-                np.swapaxes(KJ, 1, 2) @ solved[..., :-1]
-            ).sum(axis=0)
-            g = (gj - np.swapaxes(KJ, 1, 2) @ solved[..., -1:]).sum(axis=0)
-            step = -np.linalg.lstsq(S, g, rcond=None)[0][:, 0]
-            pose = -(solved[..., -1] + solved[..., :-1] @ step)
-            trial = theta + free @ step
-            moved = Views(
-                rotation_vector_to_matrix(pose[:, :3]) @ views.rotation, views.translation + pose[:, 3:]
-            )
-            with np.errstate(all="ignore"):
-                r_, J_, K_ = _linear(trial, moved, board, uv, free)
-                found = float((r_**2).sum())
-            if np.isfinite(found) and found <= cost and np.isfinite(J_).all() and np.isfinite(K_).all():
-                gained, theta, views, r, J, K = cost - found, trial, moved, r_, J_, K_
-                cost, damping = found, max(damping / 10, 1e-12)
-                break
-            damping *= 10
-        if gained <= SETTLED * cost:
-            break
-    return theta, views
+    k1, k2, p1, p2, k3 = np.ravel(found[1])[:5].tolist()
+    camera = Camera(*size, A[0, 0], A[1, 1], A[0, 2], A[1, 2], 0.0, (k1, k2, p1, p2, k3))
+    rotations = np.array([cv2.Rodrigues(turn)[0] for turn in found[2]], float)
+    return camera, Views(rotations, np.array(found[3], float)[..., 0])
+
+
+def _values(camera: Camera, names: tuple[str, ...]) -> Array:
+    by_name = parameters_of(camera) | {"f": camera.fx}
+    return np.array([by_name[name] for name in names])
+
+
+def _derivatives(
+    camera: Camera, R: Array, t: Array, points: Array, names: tuple[str, ...]
+) -> tuple[Array, Array]:
+    """Of the pixels (M, 2) of points (M, 3) in a view: by P parameters (2M, P), by its pose (2M, 6)."""
+    bends = np.array(camera.distortion)
+    found = np.asarray(cv2.projectPoints(points, cv2.Rodrigues(R)[0], t, camera.matrix, bends)[1], float)
+    return np.stack([found[:, _COLUMNS[name]].sum(axis=1) for name in names], axis=-1), found[:, :6]
+
+
+def _information(camera: Camera, R: Array, t: Array, points: Array, names: tuple[str, ...]) -> Array:
+    """(P, P) what a view's points (M, 3) say of the parameters with its pose eliminated."""
+    J, K = _derivatives(camera, R, t, points, names)
+    return np.asarray(J.T @ (J - K @ np.linalg.lstsq(K, J, rcond=None)[0]))
 
 
 #: Blocks of views that are held out in turn, and what is taken where there are too few views for that.
@@ -396,11 +390,11 @@ def choose_lens(board: ArrayLike, uv: ArrayLike, width: int, height: int) -> Len
     if len(uv) - max(len(block) for block in blocks) < FEWEST:
         return LensChoice(TOO_FEW_FOR_CHOICE, {})
     squared: dict[str, Array] = {}
-    for lens, bends in LENSES.items():
+    for lens in LENSES:
         errors = np.empty(len(uv))
         for block in blocks:
             rest = np.delete(uv, block, axis=0)
-            camera = calibrate_camera(board, rest, width, height, (*PINHOLE, *bends), resample=False).camera
+            camera = calibrate_camera(board, rest, width, height, lens, resample=False).camera
             errors[block] = view_errors(camera, board, uv[block])
         squared[lens] = errors**2
     means = {lens: float(one.mean()) if np.isfinite(one).all() else np.inf for lens, one in squared.items()}
@@ -442,10 +436,9 @@ def direction_sd(found: Intrinsics, uv: ArrayLike) -> Array:
 
 def _by_direction(found: Intrinsics, uv: Array) -> tuple[Array, Array]:
     """How pixels (N, 2) of fixed directions move with the estimate, (N, 2, P), and a turn, (N, 2, 3)."""
-    xy = normalise(found.camera, uv)
-    rays = np.column_stack([xy, np.ones(len(xy))])
-    at = project_board(parameters_of(found.camera), Views(np.eye(3)[None], np.zeros((1, 3))), rays)
-    return at.by_intrinsics[0] @ free_columns(found.names), at.by_pose[0, ..., :3]
+    rays = np.column_stack([normalise(found.camera, uv), np.ones(len(uv))])
+    J, K = _derivatives(found.camera, np.eye(3), np.zeros(3), rays, found.names)
+    return J.reshape(len(uv), 2, -1), K[:, :3].reshape(-1, 2, 3)
 
 
 def image_raster(camera: Camera) -> Array:

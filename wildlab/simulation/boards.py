@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from wildlab.geometry.board_views import Views
 from wildlab.geometry.camera import Camera, in_image, normalise, normalise_jacobian, project
 from wildlab.geometry.frames import Array, euler_to_matrix
+from wildlab.geometry.intrinsics import Views
 
 #: How far the margin reaches beyond the outermost squares or circles, in spacings.
 MARGIN = 0.6

@@ -13,13 +13,12 @@ from matplotlib.figure import Figure
 from wildlab.detection.boards import Board, find_board, grey8
 from wildlab.evaluation.intervals import Interval
 from wildlab.evaluation.replication import propagate_rounding
-from wildlab.geometry.board_views import Views, parameters_of, project_board
 from wildlab.geometry.calibration import Mounting, mounting_from_points
 from wildlab.geometry.camera import Camera, camera_from_data_sheet
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
-from wildlab.geometry.intrinsics import PINHOLE, calibrate_camera
+from wildlab.geometry.intrinsics import PINHOLE, Views, calibrate_camera, parameters_of, project_board
 from wildlab.geometry.mount import Mount, camera_rotation, helgesen_misalignment
 from wildlab.reporting.charts.drawing import draw_dots, finish
 from wildlab.reporting.charts.forms import Values, rows_chart
@@ -85,7 +84,7 @@ def measure_centres(rng: np.random.Generator, images: int) -> Centres:
         seen = find_board(grey8(noisy), GRID)
         if seen is None:
             continue
-        true = project_board(parameters_of(TAU2), Views(R[None], t[None]), GRID.points).uv[0]
+        true = project_board(TAU2, Views(R[None], t[None]), GRID.points)[0]
         # A square grid does not say which circle is the first: each is compared with the nearest.
         nearest = np.linalg.norm(seen.uv[:, None] - true, axis=2).argmin(axis=1)
         squares.append((seen.uv - true[nearest]) ** 2)
@@ -114,16 +113,16 @@ def calibrations(rng: np.random.Generator, runs: int, sd: float, images: int = I
         A row a run: ``fx``, ``fy``, ``cx``, ``cy`` of the first set, and with ``sd_`` (as the calibration
         states it), ``inside_`` (the truth in its 95 % interval) and ``second_`` (of the second set).
     """
-    truth = dict(zip(PINHOLE, parameters_of(TAU2), strict=False))
+    truth = parameters_of(TAU2)
     rows = []
     for _ in range(runs):
         row: dict[str, float] = {}
         for prefix in ("", "second_"):
             views = board_views(rng, TAU2, GRID.points, images)
-            uv = project_board(parameters_of(TAU2), views, GRID.points).uv
+            uv = project_board(TAU2, views, GRID.points)
             uv = uv + rng.normal(0, sd, uv.shape)
             first = prefix == ""
-            found = calibrate_camera(GRID.points, uv, TAU2.width, TAU2.height, PINHOLE, resample=first)
+            found = calibrate_camera(GRID.points, uv, TAU2.width, TAU2.height, "none", resample=first)
             for name in PINHOLE:
                 row[prefix + name] = found.value(name)
                 if first:

@@ -11,10 +11,9 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from wildlab.detection.boards import Board
-from wildlab.geometry.board_views import parameters_of, project_board
 from wildlab.geometry.camera import Camera, normalise, undistort, undistort_approximately
 from wildlab.geometry.frames import Array
-from wildlab.geometry.intrinsics import PINHOLE, calibrate_camera
+from wildlab.geometry.intrinsics import PINHOLE, calibrate_camera, project_board
 from wildlab.reporting.charts.forms import fields_chart
 from wildlab.reporting.published import error_name
 from wildlab.simulation.boards import board_views
@@ -142,15 +141,14 @@ def come_back(
     DataFrame
         A row a run: fx, fy, cx, cy (px) and k1.
     """
-    names = (*PINHOLE, "k1")
     values = []
     for _ in range(runs):
         views = board_views(rng, camera, BOARD.points, images)
-        uv = project_board(parameters_of(camera), views, BOARD.points).uv
+        uv = project_board(camera, views, BOARD.points)
         uv = uv + rng.normal(0, noise, uv.shape)
-        found = calibrate_camera(BOARD.points, uv, camera.width, camera.height, names, resample=False)
+        found = calibrate_camera(BOARD.points, uv, camera.width, camera.height, "k1", resample=False)
         values.append(found.values)
-    return pd.DataFrame(values, columns=names)
+    return pd.DataFrame(values, columns=[*PINHOLE, "k1"])
 
 
 def videos_table(videos: Sequence[Video], height: float) -> pd.DataFrame:
