@@ -18,8 +18,7 @@ from wildlab.geometry.covariances import ellipse_axes
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.mount import Mount
 from wildlab.geometry.terrain import Terrain
-from wildlab.geometry.terrain_uncertainty import terrain_covariance
-from wildlab.geometry.uncertainty import PoseErrors, ground_covariance
+from wildlab.geometry.uncertainty import PoseErrors, ground_covariance, terrain_covariance
 
 FOCAL, MIDDLE, HEIGHT = 800.0, (1000.0, 750.0), 60.0
 CAMERA = Camera(2000, 1500, FOCAL, FOCAL, *MIDDLE)

@@ -17,8 +17,7 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, Mask
 from wildlab.geometry.georeference import RAY_STATUS, georeference_pixels
 from wildlab.geometry.terrain import Terrain, pixels_to_terrain
-from wildlab.geometry.terrain_uncertainty import terrain_covariance
-from wildlab.geometry.uncertainty import PoseErrors, ground_covariance
+from wildlab.geometry.uncertainty import PoseErrors, ground_covariance, terrain_covariance
 
 #: Standard deviations assumed where neither the log nor the manifest states one; those of the attitude as in
 #: `wildlab.geometry.attitude_uncertainty`.

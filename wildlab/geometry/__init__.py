@@ -167,14 +167,6 @@ if TYPE_CHECKING:
         intersect_terrain,
         pixels_to_terrain,
     )
-    from wildlab.geometry.terrain_uncertainty import (
-        TerrainCovariance,
-        TerrainJacobians,
-        sample_terrain,
-        terrain_covariance,
-        terrain_flatness,
-        terrain_jacobians,
-    )
     from wildlab.geometry.uncertainty import (
         GroundCovariance,
         GroundJacobians,
@@ -186,6 +178,9 @@ if TYPE_CHECKING:
         ray_heading_sd,
         sample_ground,
         sample_rays,
+        sample_terrain,
+        terrain_covariance,
+        terrain_jacobians,
     )
     from wildlab.geometry.viewsheds import (
         Footprint,
@@ -231,8 +226,6 @@ __all__ = [
     "PosesAt",
     "RobustFit",
     "Terrain",
-    "TerrainCovariance",
-    "TerrainJacobians",
     "Twist",
     "Velocity",
     "Views",
@@ -327,7 +320,6 @@ __all__ = [
     "student_weights",
     "target_velocity",
     "terrain_covariance",
-    "terrain_flatness",
     "terrain_jacobians",
     "tilt_and_heading",
     "tilt_from_roll_pitch",

@@ -1,19 +1,27 @@
-"""How wrong a georeferenced point may be: a 2x2 ground covariance per detection.
+"""How wrong a georeferenced point may be: a 2x2 ground covariance per detection, on a plane or on terrain.
 
 Errors of the pixel, the pose (position in n, attitude as a rotation vector in b: ``R_true = R Exp(delta)``,
-H 7.15), the mount (a rotation vector in m) and the height of the plane are taken to the ground by
-linearisation. Where the ray is flat against its own uncertainty (the cotangent bends), or the heading sweeps
-an arc that no ellipse along its tangent holds, that is known to be wrong, and the ellipse comes from samples.
+H 7.15), the mount (a rotation vector in m) and the height of the ground are taken to the ground by
+linearisation. First order, the ground about a point is the plane that touches it. A shift of the ray there
+moves the point along the ray onto that plane: with the normal ``v`` of the plane and the ray ``d``,
+``I - d v' / v'd``.
 
-How flat is too flat has a closed form. With depression ``a`` of the ray and standard deviation ``s`` of ``a``
-the second-order term of ``h cot(a)`` is ``s cot(a)`` times the first. Linear ellipses are kept up to a tenth,
-which for 2 deg is a ray 19 deg below the horizon. So has the arc: a heading of standard deviation ``s`` draws
-a point at the distance ``r`` in by ``r s^2 / 2``, whose own standard deviation is ``r s^2 / sqrt(2)``. Linear
-ellipses are kept up to a third of the one that they have in that direction.
+Where the ray is flat against its own uncertainty (the cotangent bends), or the heading sweeps an arc that no
+ellipse along its tangent holds, that is known to be wrong, and the ellipse comes from samples. How flat is
+too flat has a closed form. With depression ``a`` of the ray against the plane and standard deviation ``s`` of
+``a`` the second-order term of ``h cot(a)`` is ``s cot(a)`` times the first. Linear ellipses are kept up to a
+tenth, which for 2 deg is a ray 19 deg below the horizon. So has the arc: a heading of standard deviation
+``s`` draws a point at the distance ``r`` in by ``r s^2 / 2``, whose own standard deviation is
+``r s^2 / sqrt(2)``. Linear ellipses are kept up to a third of the one that they have in that direction.
+
+Where terrain leaves the touching plane is found by trying it: rays towards 16 points of the ellipse on that
+plane, half way and at the 90 % ellipse, are followed to the terrain. Where one of them misses, or meets it
+elsewhere than on the plane by more than a fraction of the ellipse, samples decide.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -25,14 +33,21 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.covariances import chi2_quantile
 from wildlab.geometry.frames import Array, rotation_vector_to_matrix, skew
 from wildlab.geometry.georeference import georeference_pixels, intersect_plane, matching
+from wildlab.geometry.terrain import Met, Terrain, intersect_terrain, pixels_to_terrain
 
 #: Ratio of the second-order to the first-order term above which the linear ellipse is not trusted.
 FLAT = 0.1
 #: Ratio of the arc's standard deviation to the linear one, towards the aircraft, above which it is not.
 ARC = 1 / 3
-#: Share of samples above the horizon beyond which no ellipse is given at all.
+#: Share of samples that meet no ground beyond which no ellipse is given at all.
 UNBOUNDED = 0.05
 SAMPLES = 1000
+#: Of the ellipse's own size, how far the terrain may lie from the touching plane.
+BENT = 0.2
+#: At which radii of the ellipse, in standard deviations, that is tried: 90 % lie within the second.
+TRIED = (1.07, 2.146)
+#: Samples on either side of a gap before they are two groups, and the gap in standard deviations within them.
+GROUP, GAP = 0.02, 1.0
 
 
 class PoseErrors(NamedTuple):
@@ -57,11 +72,16 @@ class PoseErrors(NamedTuple):
 
 
 class GroundCovariance(NamedTuple):
-    """Result of :func:`ground_covariance`.
+    """Result of :func:`ground_covariance` and :func:`terrain_covariance`.
 
-    ``covariance`` (N, 2, 2), north-east, metres squared; its 90 % ellipse is ``chi2_2(0.9)`` times it.
-    ``method`` (N,): ``"linear"``, ``"sampled"``, ``"unbounded"`` (more than 5 % of the rays above the
-    horizon, covariance NaN) or ``"none"`` (the point itself is NaN).
+    Attributes
+    ----------
+    covariance
+        (N, 2, 2), north-east, metres squared; its 90 % ellipse is ``chi2_2(0.9)`` times it.
+    method
+        (N,): ``"linear"``, ``"sampled"``, ``"split"`` (sampled, and the samples fall into a near and a far
+        group: a ridge), ``"unbounded"`` (more than 5 % of the samples meet no ground: covariance NaN) or
+        ``"none"`` (the point itself is NaN).
     """
 
     covariance: Array
@@ -72,16 +92,13 @@ class GroundJacobians(NamedTuple):
     """Derivatives of the ground point (N, 2) north-east with respect to each source of error."""
 
     pixel: Array  # (N, 2, 2)
-    pose: Array  # (N, 2, 6)
-    mount: Array  # (N, 2, 3)
-    plane: Array  # (N, 2)
+    pose: Array  # (N, 2, 6): position in n, rotation vector in b
+    mount: Array  # (N, 2, 3): rotation vector in m
+    plane: Array  # (N, 2): the ground's down coordinate
 
 
 def ground_jacobians(poses: CameraPoses, uv: ArrayLike, plane_down: ArrayLike) -> GroundJacobians:
     """Derivatives of :func:`~wildlab.geometry.georeference.georeference_pixels`, north and east.
-
-    A small shift of the ray's foot or direction moves the ground point along the ray's own projection onto
-    the plane: ``[I, -d_h / d_z]`` times the shift in n. All derivatives follow from that.
 
     Parameters
     ----------
@@ -102,30 +119,69 @@ def ground_jacobians(poses: CameraPoses, uv: ArrayLike, plane_down: ArrayLike) -
     WildlabError
         Where there is another number of poses, or of planes, than of pixels.
     """
-    pixels, planes = matching(poses, uv, plane_down)
-    camera, R, R_nc = poses.camera, poses.R_nb, poses.R_nc
-    xy = normalise(camera, pixels)
-    d_c = np.concatenate([xy, np.ones((*xy.shape[:-1], 1))], axis=-1)
-    R_nm = R @ poses.R_bm
-    d_m = d_c @ poses.R_mc.T
-    d_n = np.einsum("...ij,...j->...i", R_nc, d_c)
-    d_b = np.einsum("...ji,...j->...i", R, d_n)
-    drop = np.broadcast_to(planes - poses.p_nc[..., 2], d_n.shape[:-1])
-    hits = (d_n[..., 2] > 0) & (drop > 0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        slope = np.where(hits[..., None], d_n[..., :2] / d_n[..., 2:], np.nan)
-        depth = np.where(hits, drop / d_n[..., 2], np.nan)
-    onto_plane = np.concatenate([np.broadcast_to(np.eye(2), (*slope.shape, 2)), -slope[..., None]], axis=-1)
-    along = onto_plane * depth[..., None, None]
+    points = georeference_pixels(poses, uv, plane_down)
+    return terrain_jacobians(poses, uv, points, 0.0 * points[..., :2])
 
-    pose = np.empty((*slope.shape, 6))
-    pose[..., :3] = onto_plane
-    pose[..., 3:] = -along @ R @ skew(d_b) - onto_plane @ R @ skew(poses.lever_arm)
+
+def terrain_jacobians(
+    poses: CameraPoses, uv: ArrayLike, points: ArrayLike, slopes: ArrayLike
+) -> GroundJacobians:
+    """Derivatives of where a pixel's ray meets the plane that touches the ground.
+
+    Parameters
+    ----------
+    poses
+        The camera, with a pose for each pixel or one for all.
+    uv
+        (N, 2) pixels.
+    points
+        (N, 3) where their rays meet the ground, metres in n.
+    slopes
+        (N, 2) of the ground there: metres upwards for a metre north, and for a metre east.
+
+    Returns
+    -------
+    GroundJacobians
+        NaN where a point or a slope is.
+
+    Raises
+    ------
+    WildlabError
+        Where there is another number of poses than of pixels.
+
+    Examples
+    --------
+    100 m above level ground, looking straight down: a pixel is a tenth of a metre.
+
+    >>> from wildlab.geometry.camera import Camera
+    >>> from wildlab.geometry.mount import Mount
+    >>> camera = Camera(640, 512, 1000.0, 1000.0, 320.0, 256.0)
+    >>> poses = CameraPoses(camera, Mount("down"), np.array([0.0, 0.0, -100.0]), np.eye(3))
+    >>> J = terrain_jacobians(poses, [[320.0, 256.0]], [[0.0, 0.0, 0.0]], [[0.0, 0.0]])
+    >>> print(np.abs(np.round(J.pixel[0], 3)))
+    [[0.  0.1]
+     [0.1 0. ]]
+    """
+    pixels, _ = matching(poses, uv)
+    camera, R, R_nc = poses.camera, poses.R_nb, poses.R_nc
+    xy, d_c, d_n = _rays(poses, pixels)
+    d_m = d_c @ poses.R_mc.T
+    d_b = np.einsum("...ji,...j->...i", R, d_n)
+    normal = _normals(slopes)
+    toward = np.einsum("...i,...i->...", normal, d_n)[..., None, None]
+    away = np.asarray(points, float) - poses.p_nc
+    with np.errstate(divide="ignore", invalid="ignore"):
+        depth = np.einsum("...i,...i->...", away, d_n) / np.einsum("...i,...i->...", d_n, d_n)
+        onto = np.eye(3)[:2] - d_n[..., :2, None] * (normal[..., None, :] / toward)
+    along = onto * depth[..., None, None]
+    pose = np.empty((*depth.shape, 2, 6))
+    pose[..., :3] = onto
+    pose[..., 3:] = -along @ R @ skew(d_b) - onto @ R @ skew(poses.lever_arm)
     return GroundJacobians(
         pixel=along @ R_nc[..., :, :2] @ normalise_jacobian(camera, xy),
         pose=pose,
-        mount=-along @ R_nm @ skew(d_m),
-        plane=slope,
+        mount=-along @ (R @ poses.R_bm) @ skew(d_m),
+        plane=-onto[..., 2],
     )
 
 
@@ -141,10 +197,12 @@ def _linear(jacobians: GroundJacobians, errors: PoseErrors) -> Array:
     )
 
 
-def ray_flatness(poses: CameraPoses, uv: ArrayLike, errors: PoseErrors) -> Array:
-    """How flat each ray is against its own uncertainty: ``s cot(a)``.
+def ray_flatness(
+    poses: CameraPoses, uv: ArrayLike, errors: PoseErrors, slopes: ArrayLike = (0.0, 0.0)
+) -> Array:
+    """How flat each ray is on the ground against its own uncertainty: ``s cot(a)``.
 
-    That is the standard deviation of its depression ``a`` times the cotangent of it.
+    That is the standard deviation of ``v'd``, for a unit normal and a unit ray, over ``v'd`` itself.
 
     Parameters
     ----------
@@ -153,11 +211,13 @@ def ray_flatness(poses: CameraPoses, uv: ArrayLike, errors: PoseErrors) -> Array
     uv
         (N, 2) pixels.
     errors
-        Covariances of the sources; those of position and plane play no part.
+        Covariances of the sources; those of position and height play no part.
+    slopes
+        (N, 2) of the ground where their rays meet it, or (2,); level where it is left out.
 
     Returns
     -------
-    (N,), no unit; infinite at and above the horizon.
+    (N,), no unit; infinite at and above the horizon, and where a ray comes from behind the slope.
 
     Raises
     ------
@@ -165,32 +225,26 @@ def ray_flatness(poses: CameraPoses, uv: ArrayLike, errors: PoseErrors) -> Array
         Where there is another number of poses than of pixels.
     """
     pixels, _ = matching(poses, uv)
-    camera, R, R_nc = poses.camera, poses.R_nb, poses.R_nc
-    xy = normalise(camera, pixels)
-    d_c = np.concatenate([xy, np.ones((*xy.shape[:-1], 1))], axis=-1)
+    xy, d_c, d_n = _rays(poses, pixels)
     length = np.linalg.norm(d_c, axis=-1, keepdims=True)
-    d_n = np.einsum("...ij,...j->...i", R_nc, d_c) / length
-    level = np.hypot(d_n[..., 0], d_n[..., 1])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        # Unit vector of increasing depression; any horizontal direction serves a ray straight down.
-        steeper = np.stack(
-            [-d_n[..., 0] * d_n[..., 2] / level, -d_n[..., 1] * d_n[..., 2] / level, level], axis=-1
-        )
-    steeper[level < 1e-12] = [1.0, 0.0, 0.0]
-    # The ray turns by a rotation vector r (in n) through r x d; its depression changes by (d x steeper) . r.
-    axis = np.cross(d_n, steeper)
-    on_body = np.einsum("...ji,...j->...i", R, axis)
+    d_n = d_n / length
+    normal = _normals(slopes)
+    normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+    toward = np.einsum("...i,...i->...", normal, d_n)
+    # A rotation vector r turns the ray by r x d, and v'd by (d x v)'r.
+    axis = np.cross(d_n, normal)
+    on_body = np.einsum("...ji,...j->...i", poses.R_nb, axis)
     on_mount = np.einsum("...ji,...j->...i", poses.R_bm, on_body)
-    on_pixel = (
-        np.einsum("...i,...ij->...j", steeper, R_nc[..., :, :2] @ normalise_jacobian(camera, xy)) / length
-    )
+    across = normal - toward[..., None] * d_n
+    J = poses.R_nc[..., :, :2] @ normalise_jacobian(poses.camera, xy)
+    on_pixel = np.einsum("...i,...ij->...j", across, J) / length
     variance = (
         np.einsum("...i,...ij,...j->...", on_body, np.asarray(errors.pose)[..., 3:, 3:], on_body)
         + np.einsum("...i,ij,...j->...", on_mount, errors.mount, on_mount)
         + np.einsum("...i,...ij,...j->...", on_pixel, errors.pixel, on_pixel)
     )
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(d_n[..., 2] > 0, np.sqrt(variance) * level / d_n[..., 2], np.inf)
+        return np.where(toward > 0, np.sqrt(variance) / toward, np.inf)
 
 
 def arc_bend(offset: ArrayLike, heading_sd: ArrayLike, covariance: ArrayLike) -> Array:
@@ -282,30 +336,105 @@ def ground_covariance(
     WildlabError
         Where there is another number of poses, of planes or of errors than of pixels.
     """
-    uv = np.atleast_2d(uv).astype(float)
-    n = len(uv)
-    for name, axes in (("pixel", 2), ("pose", 2), ("plane", 0)):
-        shape = np.shape(getattr(errors, name))
-        lead = shape[: len(shape) - axes]
-        if lead not in ((), (n,)):
-            raise WildlabError(
-                f"errors of the rows {lead} for {n} pixels", "give one for each, or one for all", field=name
-            )
-    covariance = _linear(ground_jacobians(poses, uv, plane_down), errors)
+    pixels = np.atleast_2d(uv).astype(float)
+    planes = np.broadcast_to(np.asarray(plane_down, float), len(pixels))
+    _check_errors(errors, len(pixels))
+    points = georeference_pixels(poses, pixels, planes)
+    level = 0.0 * points[:, :2]
+    covariance = _linear(terrain_jacobians(poses, pixels, points, level), errors)
+    curved = _curved(poses, pixels, points, level, covariance, errors)
+
+    def sample(i: int, one: PoseErrors) -> Array:
+        return sample_ground(poses.take(i), pixels[i], float(planes[i]), one, rng, SAMPLES)
+
+    found = _with_samples(covariance, curved, errors, sample, points, poses)
+    # On a plane there is no ridge that would part samples: those far away are rays along it.
+    return found._replace(method=np.where(found.method == "split", "sampled", found.method))
+
+
+def terrain_covariance(
+    poses: CameraPoses,
+    uv: ArrayLike,
+    terrain: Terrain,
+    errors: PoseErrors,
+    rng: np.random.Generator,
+    met: Met | None = None,
+) -> GroundCovariance:
+    """Covariance of each point (north, east) on terrain, by linearisation or, where that fails, by sampling.
+
+    A sampled covariance has the shape of the samples' second moment about the computed point and the size
+    that puts 90 % of them inside its 90 % ellipse, as in `ground_covariance`.
+
+    Parameters
+    ----------
+    poses
+        The camera, with a pose for each pixel or one for all.
+    uv
+        (N, 2) pixels.
+    terrain
+        In the same n.
+    errors
+        Covariances of the sources; ``plane`` is the variance of the terrain's height.
+    rng
+        Drawn from only where a ray is sampled.
+    met
+        Where the rays meet the terrain, if that is known already.
+
+    Returns
+    -------
+    GroundCovariance
+
+    Raises
+    ------
+    WildlabError
+        Where there is another number of poses, or of errors, than of pixels.
+    """
+    pixels, _ = matching(poses, np.atleast_2d(np.asarray(uv, float)))
+    _check_errors(errors, len(pixels))
+    points = (pixels_to_terrain(poses, pixels, terrain) if met is None else met).points
+    slopes = terrain.slopes_at(points[:, :2])
+    covariance = _linear(terrain_jacobians(poses, pixels, points, slopes), errors)
+    linear = np.isfinite(covariance).all(axis=(1, 2))
+    # A ray may end where the slope has no height beside it: a point without a plane is sampled, too.
+    doubtful = np.isfinite(points).all(axis=1) & ~linear
+    doubtful |= _curved(poses, pixels, points, slopes, covariance, errors)
+    rest = linear & ~doubtful
+    doubtful[rest] = _bent(poses.take(rest), terrain, points[rest], slopes[rest], covariance[rest])
+
+    def sample(i: int, one: PoseErrors) -> Array:
+        return sample_terrain(poses.take(i), pixels[i], terrain, one, rng, SAMPLES)
+
+    return _with_samples(covariance, doubtful, errors, sample, points, poses)
+
+
+def _curved(
+    poses: CameraPoses, pixels: Array, points: Array, slopes: Array, covariance: Array, errors: PoseErrors
+) -> NDArray[np.bool_]:
+    """Where the linear covariance (N, 2, 2) of a touching plane is known to be wrong."""
+    arc = arc_bend(points[:, :2] - poses.p_nc[..., :2], ray_heading_sd(poses, errors), covariance)
+    bent = (arc > ARC) | ~(ray_flatness(poses, pixels, errors, slopes) <= FLAT)
+    return np.asarray(np.isfinite(covariance).all(axis=(1, 2)) & bent)
+
+
+def _with_samples(
+    covariance: Array,
+    doubtful: NDArray[np.bool_],
+    errors: PoseErrors,
+    sample: Callable[[int, PoseErrors], Array],
+    points: Array,
+    poses: CameraPoses,
+) -> GroundCovariance:
+    """Covariances (N, 2, 2), those that are doubtful by samples (S, 2) or (S, 3) about the points."""
+    n = len(covariance)
     method = np.where(np.isfinite(covariance).all(axis=(1, 2)), "linear", "none").astype("<U9")
-    planes = np.broadcast_to(np.asarray(plane_down, float), n)
-    offset = georeference_pixels(poses, uv, planes)[:, :2] - poses.p_nc[..., :2]
-    bent = arc_bend(offset, ray_heading_sd(poses, errors), covariance) > ARC
-    curved = (method == "linear") & (bent | (ray_flatness(poses, uv, errors) > FLAT))
-    for i in np.flatnonzero(curved):
+    for i in np.flatnonzero(doubtful).tolist():
         one = PoseErrors(
             pixel=np.broadcast_to(errors.pixel, (n, 2, 2))[i],
             pose=np.broadcast_to(errors.pose, (n, 6, 6))[i],
             mount=errors.mount,
             plane=float(np.broadcast_to(errors.plane, n)[i]),
         )
-        covariance[i] = _sampled(poses.take(int(i)), uv[i], float(planes[i]), one, rng)
-        method[i] = "sampled" if np.isfinite(covariance[i]).all() else "unbounded"
+        covariance[i], method[i] = _of_samples(sample(i, one), points[i], poses.take(i).p_nc)
     return GroundCovariance(covariance, method)
 
 
@@ -382,21 +511,121 @@ def sample_rays(
     return rays, np.asarray(pose.p_nb + off[:, :3] + R @ pose.lever_arm)
 
 
-def _sampled(
-    pose: CameraPoses, uv: Array, plane_down: float, errors: PoseErrors, rng: np.random.Generator
+def sample_terrain(
+    pose: CameraPoses,
+    uv: ArrayLike,
+    terrain: Terrain,
+    errors: PoseErrors,
+    rng: np.random.Generator,
+    n: int,
 ) -> Array:
-    """Covariance (2, 2) of one ray from samples; NaN where too many miss the ground."""
-    ground = sample_ground(pose, uv, plane_down, errors, rng, SAMPLES)
-    centre = georeference_pixels(pose, uv, plane_down)[:2]
-    offsets = ground - centre
+    """Points on terrain of one detection with its errors drawn from their covariances.
+
+    Parameters
+    ----------
+    pose
+        The camera, with one pose.
+    uv
+        (2,) pixel.
+    terrain
+        In the same n; it rises or sinks as a whole.
+    errors
+        Covariances of the sources, each given once.
+    rng
+        Drawn from.
+    n
+        How many draws.
+
+    Returns
+    -------
+    (n, 3) metres in n; misses are NaN.
+
+    Raises
+    ------
+    WildlabError
+        Where there is more than one pose.
+    """
+    pixel, _ = matching(pose, uv)
+    rays, starts = sample_rays(pose, pixel, errors, rng, n)
+    higher = np.sqrt(float(np.asarray(errors.plane))) * rng.standard_normal(n)
+    # Ground that is higher is the same as a camera that is lower, but for the height of the point.
+    shift = np.column_stack([np.zeros((n, 2)), higher])
+    return np.asarray(intersect_terrain(terrain, rays, starts + shift).points - shift)
+
+
+def _rays(poses: CameraPoses, pixels: Array) -> tuple[Array, Array, Array]:
+    """Normalised pixels, and rays of depth 1 in c and in n."""
+    xy = normalise(poses.camera, pixels)
+    d_c = np.concatenate([xy, np.ones((*xy.shape[:-1], 1))], axis=-1)
+    return xy, d_c, np.einsum("...ij,...j->...i", poses.R_nc, d_c)
+
+
+def _normals(slopes: ArrayLike) -> Array:
+    """(..., 3) normals of slopes, into the ground: ``down + height(north, east)`` grows along them."""
+    given = np.asarray(slopes, float)
+    return np.concatenate([given, np.ones((*given.shape[:-1], 1))], axis=-1)
+
+
+def _check_errors(errors: PoseErrors, n: int) -> None:
+    for name, axes in (("pixel", 2), ("pose", 2), ("plane", 0)):
+        shape = np.shape(getattr(errors, name))
+        lead = shape[: len(shape) - axes]
+        if lead not in ((), (n,)):
+            raise WildlabError(
+                f"errors of the rows {lead} for {n} pixels", "give one for each, or one for all", field=name
+            )
+
+
+def _bent(
+    poses: CameraPoses, terrain: Terrain, points: Array, slopes: Array, covariance: Array
+) -> NDArray[np.bool_]:
+    """Where the terrain leaves the plane that touches it, within the ellipse."""
+    values, vectors = np.linalg.eigh(covariance)
+    axes = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
+    turns = np.arange(8) * np.pi / 4
+    unit = np.concatenate([radius * np.column_stack([np.cos(turns), np.sin(turns)]) for radius in TRIED])
+    offsets = np.einsum("nij,kj->nki", axes, unit)
+    rise = np.einsum("nki,ni->nk", offsets, slopes)
+    aims = points[:, None, :] + np.concatenate([offsets, -rise[..., None]], axis=-1)
+    starts = np.broadcast_to(np.broadcast_to(poses.p_nc, points.shape)[:, None, :], aims.shape)
+    rays = aims - starts
+    met = intersect_terrain(terrain, rays.reshape(-1, 3), starts.reshape(-1, 3)).points.reshape(aims.shape)
+    off = (met - aims)[..., :2]
+    # In standard deviations along the axes of the ellipse; a sharp one has a least width to divide by.
+    width = np.sqrt(np.maximum(values, 1e-12 * values[:, 1:] + 1e-12))
+    inside = np.einsum("nij,nki->nkj", vectors, off) / width[:, None, :]
+    far = np.linalg.norm(inside, axis=-1) / np.linalg.norm(unit, axis=-1)
+    return np.asarray(~(far <= BENT).all(axis=1))
+
+
+def _of_samples(samples: Array, centre: Array, p_nc: Array) -> tuple[Array, str]:
+    """Covariance (2, 2) that holds nine tenths of samples, and what became of it."""
+    offsets = samples[:, :2] - centre[:2]
     hit = np.isfinite(offsets).all(axis=1)
     if hit.mean() < 1 - UNBOUNDED:
-        return np.full((2, 2), np.nan)
-    # The shape comes from the nearer nine tenths: a few rays that graze the horizon would own it otherwise.
+        return np.full((2, 2), np.nan), "unbounded"
     distance = np.where(hit, np.linalg.norm(offsets, axis=1), np.inf)
+    # The shape comes from the nearer nine tenths: a few rays that go far beyond would own it otherwise.
     core = offsets[distance <= np.quantile(distance, 0.9)]
     shape = core.T @ core / len(core)
+    shape += 1e-9 * np.trace(shape) * np.eye(2)
     squared = np.where(
         hit, np.einsum("ni,ij,nj->n", offsets, np.linalg.inv(shape), offsets, optimize=True), np.inf
     )
-    return np.asarray(shape * np.quantile(squared, 0.9, method="lower") / chi2_quantile(0.9, 2))
+    size = np.quantile(squared, 0.9, method="lower") / chi2_quantile(0.9, 2)
+    away = np.linalg.norm(samples[hit] - p_nc[: samples.shape[1]], axis=1)
+    return np.asarray(shape * size), "split" if _two_groups(away) else "sampled"
+
+
+def _two_groups(distances: Array) -> bool:
+    """Whether distances fall into a near and a far group."""
+    ordered = np.sort(distances)
+    n = len(ordered)
+    few = max(2, int(GROUP * n))
+    gaps = np.diff(ordered)[few - 1 : n - few]
+    if not len(gaps):
+        return False
+    cut = int(np.argmax(gaps)) + few
+    near, far = ordered[:cut], ordered[cut:]
+    within = np.sqrt((near.var() * len(near) + far.var() * len(far)) / n)
+    return bool(gaps.max() > GAP * within)

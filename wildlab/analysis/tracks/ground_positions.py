@@ -39,8 +39,7 @@ from wildlab.geometry.attitude_uncertainty import level_axes
 from wildlab.geometry.camera import in_image, project
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import pixels_to_terrain
-from wildlab.geometry.terrain_uncertainty import terrain_jacobians
-from wildlab.geometry.uncertainty import PoseErrors, ground_jacobians
+from wildlab.geometry.uncertainty import GroundJacobians, PoseErrors, ground_jacobians, terrain_jacobians
 from wildlab.tracking.filters import thin
 from wildlab.tracking.many import Scan
 from wildlab.tracking.many.target_model import Sees
@@ -223,14 +222,14 @@ def errors_of_pixels(
         The k of them.
     """
     J = _jacobians(observed)
-    own = J["pixel"] @ errors.pixel @ np.swapaxes(J["pixel"], -1, -2)
+    own = J.pixel @ errors.pixel @ np.swapaxes(J.pixel, -1, -2)
     mount, plane = np.sqrt(np.diag(errors.mount)), np.sqrt(np.asarray(errors.plane))
     shared = np.concatenate(
         [
             # As of other sensors: what is added to the known pose for the true one comes off the place.
-            -J["pose"] @ of_pose[0],
-            J["mount"] * mount,
-            (J["plane"] * np.broadcast_to(plane, len(own))[:, None])[..., None],
+            -J.pose @ of_pose[0],
+            J.mount * mount,
+            (J.plane * np.broadcast_to(plane, len(own))[:, None])[..., None],
         ],
         axis=-1,
     )
@@ -282,14 +281,12 @@ def pose_correlation_time(part: SensorPart | None) -> float:
     return min((np.inf if one is None else float(one) for one in times), default=0.0)
 
 
-def _jacobians(observed: Observations) -> dict[str, Array]:
+def _jacobians(observed: Observations) -> GroundJacobians:
     o = observed
     if o.terrain is None:
-        J = ground_jacobians(o.poses, o.uv, o.plane_down)
-        return {"pixel": J.pixel, "pose": J.pose, "mount": J.mount, "plane": J.plane}
+        return ground_jacobians(o.poses, o.uv, o.plane_down)
     met = pixels_to_terrain(o.poses, o.uv, o.terrain).points
-    on = terrain_jacobians(o.poses, o.uv, met, o.terrain.slopes_at(met[:, :2]))
-    return {"pixel": on.pixel, "pose": on.pose, "mount": on.mount, "plane": on.height}
+    return terrain_jacobians(o.poses, o.uv, met, o.terrain.slopes_at(met[:, :2]))
 
 
 def _pose_roots(observed: Observations, errors: PoseErrors) -> Array:
