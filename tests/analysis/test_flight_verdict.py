@@ -34,6 +34,8 @@ GOOD = Evidence(lost=0.1, gain=0.02, possible=0.0, points=90, excess=(Interval(1
         ({"excess": (Interval(1.3, 1.1, 1.6),)}, Verdict.LOOK),
         ({"excess": (Interval(1.3, 0.9, 1.6),)}, Verdict.SOUND),  # may be by chance
         ({"excess": (Interval(1.02, 1.01, 1.03),)}, Verdict.SOUND),  # certain, and of no consequence
+        ({"excess": (Interval(0.2, 0.1, 0.4),)}, Verdict.LOOK),  # ellipses five times too long
+        ({"excess": (Interval(0.6, 0.4, 0.9),)}, Verdict.SOUND),
         ({"excess": (Interval(NAN, NAN, NAN),)}, Verdict.SOUND),
         ({"points": 9}, Verdict.LOOK),
         ({"points": NAN}, Verdict.SOUND),

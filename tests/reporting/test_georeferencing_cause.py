@@ -249,6 +249,7 @@ REASONS = [
     ((MANY, 0, ellipses("honest"), diagnosis(UNSURE)), "reason-possible"),
     ((MANY, 0, ellipses("honest"), diagnosis(NOTHING, outliers=(FAR,))), "reason-outliers"),
     ((MANY, 0, ellipses("too small", 1.3, 1.1, 1.5), diagnosis(NOTHING)), "reason-ellipses"),
+    ((MANY, 0, ellipses("too large", 0.2, 0.1, 0.4), diagnosis(NOTHING)), "reason-ellipses-long"),
     ((MANY, 13, ellipses("honest"), diagnosis(NOTHING)), "reason-lost"),
     ((MANY, 0, ellipses("honest"), diagnosis(NOTHING), 2), "reason-contradictions"),
     ((summarise(np.ones((3, 2))), 0, ellipses("honest"), diagnosis(NOTHING)), "reason-few"),

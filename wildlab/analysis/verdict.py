@@ -8,7 +8,7 @@ from enum import StrEnum
 from typing import Any, NamedTuple
 
 from wildlab.analysis.overview import Overview
-from wildlab.evaluation.ellipses import is_overconfident
+from wildlab.evaluation.ellipses import is_conservative, is_overconfident
 from wildlab.evaluation.intervals import Interval
 
 #: Share of the error, of the data or of the time below which nothing is worth mending.
@@ -116,7 +116,8 @@ def verdict_of(found: Evidence) -> Verdict:
     if found.gain >= WORTH or Verdict.FIX in found.parts:
         return Verdict.FIX
     doubted = found.possible >= WORTH or found.troubled or found.points < FEW_POINTS
-    if doubted or any(map(is_overconfident, found.excess)) or Verdict.LOOK in found.parts:
+    doubted |= any(is_overconfident(one) or is_conservative(one) for one in found.excess)
+    if doubted or Verdict.LOOK in found.parts:
         return Verdict.LOOK
     sound = found.judged > found.parts.count(Verdict.UNJUDGED) or Verdict.SOUND in found.parts
     return Verdict.SOUND if sound else Verdict.UNJUDGED

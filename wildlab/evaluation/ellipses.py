@@ -27,6 +27,8 @@ Word = Literal["honest", "too small", "too large", "undecided", "too few"]
 #: A factor nearer to one than this, either way, is of no consequence: 90 % ellipses of normal errors then
 #: hold 87 to 93 %. From the second on it matters.
 CLOSE, CLEAR = 1.06, 1.15
+#: From so many times the length that errors need on, ellipses are worth a look.
+LONG = 2.0
 #: Honest is said only where the factor is also known to lie between these.
 WIDEST = (1 / 1.5, 1.5)
 #: Mean of the logarithm of a chi-square with two degrees of freedom: log 2 less Euler's constant.
@@ -143,6 +145,22 @@ def is_overconfident(factor: Interval) -> bool:
     bool
     """
     return bool((factor.low > 1 and factor.estimate > CLEAR) or factor.low > CLOSE)
+
+
+def is_conservative(factor: Interval) -> bool:
+    """Whether those predicted exceed errors by more than chance, and by so much that a search is wasted.
+
+    Parameters
+    ----------
+    factor
+        As for `is_overconfident`.
+
+    Returns
+    -------
+    bool
+        Ellipses that are `LONG` times as long as they need be have four times the area.
+    """
+    return bool(factor.high < 1 / LONG)
 
 
 def _word(factor: Interval) -> Word:

@@ -27,7 +27,7 @@ from wildlab.analysis.verdict import (
     is_possible,
     verdict_of,
 )
-from wildlab.evaluation.ellipses import EllipseVerdict
+from wildlab.evaluation.ellipses import EllipseVerdict, is_conservative
 from wildlab.evaluation.errors import ErrorSummary, summarise
 from wildlab.flight.store import Flight
 from wildlab.messages.catalogue import Message, PageTexts, load_texts, words
@@ -314,6 +314,7 @@ def verdict_of_accuracy(
     evidence = evidence_of(logged, lost, ellipses, diagnosis, problems)
     verdict, total = verdict_of(evidence), logged.n + lost
     gain = gained_share(diagnosis.winner.gain) if diagnosis is not None and diagnosis.counts else 0.0
+    times = 1 / ellipses.factor.estimate if ellipses.factor.estimate > 0 else np.nan
     reasons: tuple[tuple[str, bool, dict[str, str]], ...] = (
         ("reason-contradictions", problems > 0, {"problems": str(problems)}),
         ("reason-lost", lost > MANY_LOST * total or not logged.n, {"lost": str(lost), "total": str(total)}),
@@ -321,6 +322,7 @@ def verdict_of_accuracy(
         ("reason-outliers", evidence.troubled > 0, {"outliers": str(evidence.troubled)}),
         ("reason-possible", evidence.possible > 0, {"share": percent_of(evidence.possible)}),
         ("reason-ellipses", ellipses.word == "too small", {}),
+        ("reason-ellipses-long", is_conservative(ellipses.factor), {"times": significant(times)}),
         ("reason-few", logged.n < FEW, {"points": str(logged.n)}),
         ("reason-untried", diagnosis is None, {}),
         ("reason-sound", True, {}),
