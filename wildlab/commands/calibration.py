@@ -301,14 +301,12 @@ def calibrate(flight: Path, out: Path, overwrite: bool, source: str | None, seed
     elif winner.causes and np.isfinite(possible.low):
         click.echo(
             f"Possible, not certain: {words_of_causes(winner.causes)}, gain {possible.low:.2f} to "
-            f"{possible.high:.2f} m on images held out. The file holds the noise of the poses alone."
+            f"{possible.high:.2f} m on images held out."
         )
     else:
-        click.echo(
-            f"No constant error is certain ({len(diagnosis.models)} models tried): the file holds the noise "
-            "of the poses alone."
-        )
+        click.echo(f"No constant error is certain ({len(diagnosis.models)} models tried).")
     if gain is None and (others := simplest_rivals(diagnosis)):
         one, other = words_of_causes(winner.causes), words_of_causes(others[0])
         click.echo(f"These images do not separate {one} from {other}.")
+    click.echo("The noise of its poses takes the place of the standard deviations that a flight states.")
     click.echo(shown(out))
