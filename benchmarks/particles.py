@@ -19,7 +19,6 @@ from wildlab.tracking.particles import (
     moments,
     move,
     resample,
-    sight_of,
     start_gaussian,
     walk_of,
     weigh,
@@ -27,7 +26,11 @@ from wildlab.tracking.particles import (
 
 ANIMALS, PARTICLES, STEPS = 10, 2000, 50
 WALK, R, DT = walk_of(0.5, 1.0), 4.0 * np.eye(2), 4.0
-SIGHT = sight_of(np.ones((20, 20), bool), 40.0, 40.0, 4.0, 0.8)
+
+
+def sight(places: Array) -> Array:
+    """Probability of detection: in a footprint of 80 m."""
+    return 0.8 * ((places > 38.0) & (places < 118.0)).all(axis=-1)
 
 
 def start(rng: np.random.Generator) -> Cloud:
@@ -43,7 +46,7 @@ def together() -> list[tuple[Array, Array]]:
     z = moments(cloud)[0]
     for _ in range(STEPS):
         cloud = move(cloud, WALK, DT, rng)
-        given = np.log1p(-SIGHT(cloud.x))
+        given = np.log1p(-sight(cloud.x))
         for a in np.flatnonzero(seen):
             given[a] = log_likelihood(cloud.x[a], z[a], R)
         cloud, _ = weigh(cloud, given)
@@ -67,7 +70,7 @@ def one_by_one() -> list[tuple[Array, Array]]:
                 off = z[a] - x[a]
                 w[a] *= np.exp(-0.5 * np.sum(off @ np.linalg.inv(R) * off, axis=1))
             else:
-                w[a] *= 1 - SIGHT(x[a])
+                w[a] *= 1 - sight(x[a])
             w[a] /= w[a].sum()
             means.append(w[a] @ x[a])
             covariances.append(np.cov(x[a].T, aweights=w[a], ddof=0))

@@ -24,10 +24,9 @@ from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.mount import Mount
 from wildlab.tracking import sensors
 from wildlab.tracking.batch import BatchCamera, run_batch
-from wildlab.tracking.kalman import predict, update
+from wildlab.tracking.kalman import Considered, predict, update
 from wildlab.tracking.motion import constant_velocity
 from wildlab.tracking.run import Start, run_filter
-from wildlab.tracking.schmidt import Considered
 
 RUNS, UPDATES = 10_000, 141
 #: Runs given to a loop in Python, and to Stone Soup.

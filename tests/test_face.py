@@ -24,7 +24,7 @@ from wildlab.analysis.navigate import (
     mean_of_runs,
     worth,
 )
-from wildlab.api.points import Points
+from wildlab.api.flights import Points
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight

@@ -21,13 +21,13 @@ from wildlab.analysis.georeference import (
     observe,
 )
 from wildlab.analysis.image_coverage import cover_images
-from wildlab.analysis.tracks.sighting import CvTuning, sighting, start
+from wildlab.analysis.tracks.pixels import CvTuning, read_pixels, start
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic
 from wildlab.reporting.front_page import FILE
 from wildlab.simulation.twins import simulate_twin
+from wildlab.tracking.kalman import Considered
 from wildlab.tracking.run import run_filter
-from wildlab.tracking.schmidt import Considered
 from wildlab.tracking.sensors import POSE, pixels
 
 Array = NDArray[np.float64]
@@ -66,7 +66,7 @@ def simulated() -> dict[str, Any]:
     metres = float(np.sqrt(np.nanmean(np.trace(covariances_of(points), axis1=1, axis2=2) / 2)))
     assumed = assumed_deviations(flight)
     tuning = CvTuning(ACCELERATION, metres, START_SPEED, metres, assumed["pixel_px"])
-    seen = sighting(flight, SOURCE)
+    seen = read_pixels(flight, SOURCE)
     cover = cover_images(flight, SOURCE)
     if cover is None:
         raise WildlabError("the twin has no footprints", "choose another")

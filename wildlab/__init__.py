@@ -22,9 +22,8 @@ from wildlab.errors import WildlabError
 from wildlab.lazy import offer
 
 if TYPE_CHECKING:
-    from wildlab.api.flights import check, simulate
+    from wildlab.api.flights import check, evaluate_points, georeference, simulate
     from wildlab.api.plot import plot
-    from wildlab.api.points import evaluate_points, georeference
     from wildlab.api.tracks import consistency, navigate, track
     from wildlab.flight.recipe.importing import import_flight
     from wildlab.flight.store import Flight, load_flight, save_flight

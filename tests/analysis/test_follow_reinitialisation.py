@@ -12,12 +12,10 @@ import pytest
 
 from tests.analysis.robots import KNOWN, joined, paused, robot_flight, rows_of
 from wildlab.analysis.tracks import single_target, tracker
-from wildlab.analysis.tracks.initiation import Geometry, ends_by
-from wildlab.analysis.tracks.inputs import SensorInputs
-from wildlab.analysis.tracks.noise_model import NoiseModel, TargetModel
-from wildlab.analysis.tracks.scans import Scans, Truth
+from wildlab.analysis.tracks.noise_model import NoiseModel, SensorInputs, TargetModel
+from wildlab.analysis.tracks.scans import Scans, Truth, sensor_of
 from wildlab.analysis.tracks.scores import estimates_table, score_tracks, seen_of, used_of
-from wildlab.analysis.tracks.single_target import SensorTrack, track_target
+from wildlab.analysis.tracks.single_target import SensorTrack, ends_of, track_target
 from wildlab.analysis.tracks.tracker import TrackingResult
 from wildlab.flight.tracking_settings import parse_settings
 from wildlab.geometry.camera import Camera
@@ -25,6 +23,7 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.mount import Mount
+from wildlab.tracking.sensors import SensorMeasurements, merge
 
 CAMERA = Camera(640, 512, 1100.0, 1100.0, 320.0, 256.0)
 HEIGHT, TILT, NOISE_PX = 60.0, 0.6, 2.0
@@ -85,7 +84,7 @@ def test_a_track_through_a_long_gap_finds_its_target_again(monkeypatch):
     for one in followed:
         assert len(one.starts) == 2 and one.times[one.starts[1]] == pytest.approx(210.0)
         assert off_after(one) < 2 * np.sqrt(2) * on_ground
-    monkeypatch.setattr(single_target, "_ends", lambda *given: None)
+    monkeypatch.setattr(single_target, "ends_of", lambda *given: None)
     without = follow()
     assert len(without[0].starts) == 1
     assert off_after(without[0]) > 10 * off_after(followed[0])
@@ -121,15 +120,21 @@ def test_all_filters_are_compared_over_the_same_looks_and_none_is_dropped_silent
 @pytest.mark.parametrize("where", ["then", "now"])
 def test_a_track_ends_where_more_is_left_out_than_stated_and_not_before_a_gap(share, gap_s, right, where):
     """Of a range of 100 m: 3 s^4 / (4 d^2) is left out for a spread s across the line of sight."""
-    D, s = np.array([[[0.0, 0.0], [0.0, 0.01]]]), 8.0
-    bent = D, np.array([[3 * s**4 / (4 * 100.0**2)]]) / share
-    flat = D, np.array([[1e6]])
-    shape = Geometry(
-        lambda row, place: bent if where == "then" else flat, lambda row: bent if where == "now" else None
-    )
-    ends = ends_by(np.array([0.0, gap_s]), 10.0, lambda row: (shape, row))
+    s, times = 8.0, {"then": 0.0, "now": gap_s}
+    sharp = np.sqrt(3 * s**4 / (4 * 100.0**2) / share)
+    inputs, seen, parts = {}, {}, []
+    for name, time in times.items():
+        one, z = np.zeros((1, 2)), np.array([[[100.0, 0.0]]])
+        scans = Scans(
+            name, "range-bearing", np.array([time]), z, one, one, ("range", "azimuth"), drop=np.zeros(1)
+        )
+        white, nan = np.array([sharp if name == where else 1e3, 1e3]), float("nan")
+        noise = NoiseModel(name, scans.kind, 0.0, white, white, (), 0.0, 1.0, nan, nan, nan, 20 / 3)
+        inputs[name], seen[name] = SensorInputs(scans, noise, []), z
+        parts.append(SensorMeasurements(scans.times, z, np.eye(2), sensor_of(scans, one)))
+    ends = ends_of(inputs, merge(parts), seen)
     P = np.diag([0.0, s**2, 1.0, 1.0])
-    assert ends(1, 0, np.array([100.0, 0.0, 0.0, 0.0]), P) is right
+    assert ends is not None and ends(1, 0, np.array([100.0, 0.0, 0.0, 0.0]), P) is right
 
 
 def test_a_target_at_rest_is_one_track_through_any_gap():

@@ -11,7 +11,7 @@ from scipy.ndimage import gaussian_filter
 from tests.analysis.building import manifest_of, poses_table, surveyed
 from wildlab.analysis.georeference import georeference, observe
 from wildlab.analysis.ground import on_level, shift_from_level
-from wildlab.analysis.tracks.sighting import sighting
+from wildlab.analysis.tracks.pixels import read_pixels
 from wildlab.flight.checks.check import check_flight
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
@@ -89,7 +89,7 @@ def test_a_ray_without_ground_is_no_sighting():
     flight.tables["detections"]["target_id"] = "m0-0"
     flight.terrain = holed()
     lost = np.isnan(observe(flight).plane_down)
-    found = sighting(flight, "logged")
+    found = read_pixels(flight, "logged")
     assert lost.any() and np.isnan(found.positions[:, 0]).any()
     frames = flight.table("detections")["frame_id"].to_numpy()
     whole = {f for f in set(frames) if lost[frames == f].all()}

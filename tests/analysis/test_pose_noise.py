@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from wildlab.analysis.pose_noise import APART_S, covariance_of, estimate_from_sighting
-from wildlab.analysis.tracks.sighting import Sighting, sighting
+from wildlab.analysis.tracks.pixels import PixelMeasurements, read_pixels
 from wildlab.evaluation.pose_noise import KINDS
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import rotation_vector_to_matrix
@@ -22,16 +22,16 @@ def flight() -> Flight:
 
 
 @pytest.fixture(scope="module")
-def exact(flight: Flight) -> Sighting:
+def exact(flight: Flight) -> PixelMeasurements:
     """The true poses, which state 1 m and 2 deg, and the positions that they give, for the truth."""
-    seen = sighting(flight, "truth")
+    seen = read_pixels(flight, "truth")
     P = np.tile(np.diag(np.square([1.0] * 3 + [np.radians(2.0)] * 3)), (len(seen.times), 1, 1))
     truth = seen.truth.copy()
     truth[:, :2] = seen.positions
     return seen._replace(poses=replace(seen.poses, covariance=P), truth=truth)
 
 
-def disturbed(exact: Sighting, degrees: float) -> Sighting:
+def disturbed(exact: PixelMeasurements, degrees: float) -> PixelMeasurements:
     """The same with roll and pitch errors of the airframe, new in each image."""
     rng = np.random.default_rng(1)
     turn = np.column_stack([rng.normal(0, np.radians(degrees), (len(exact.times), 2)), 0 * exact.times])
@@ -57,12 +57,12 @@ def test_what_a_target_cannot_tell_stays_where_the_poses_put_it(flight, exact):
 def test_one_image_in_a_while_is_enough(flight, exact):
     seen = disturbed(exact, 1.0)
     kept, last = np.zeros(len(seen.times), bool), -1
-    for row in np.flatnonzero(seen.seen):
+    for row in np.flatnonzero(seen.detected):
         slot = int((seen.times[row] - seen.times[0]) // APART_S)
         kept[row], last = slot != last, slot
     few = seen._replace(positions=np.where(kept[:, None], seen.positions, np.nan))
     assert estimate_from_sighting(flight, few).sd == estimate_from_sighting(flight, seen).sd
-    assert kept.sum() < 0.3 * seen.seen.sum()
+    assert kept.sum() < 0.3 * seen.detected.sum()
 
 
 def test_the_covariance_is_that_of_the_deviations(flight, exact):

@@ -7,10 +7,9 @@ import pandas as pd
 import pytest
 
 from tests.analysis.robots import robot, robot_flight, seen_only
-from wildlab.analysis.tracks.initiation import start_near
 from wildlab.analysis.tracks.noise_model import SensorTuning, noise_of_tuning
 from wildlab.analysis.tracks.scans import errors_near, scans_of, sensors_of, truths_at
-from wildlab.analysis.tracks.single_target import SensorTrack
+from wildlab.analysis.tracks.single_target import SensorTrack, start_near
 from wildlab.studies.autoferry import BOATS, follow_flight, tracks_table, tune_sensor
 
 EXACT = {"kind": "position", "range_sd": 0.0, "bearing_sd_deg": 0.0, "position_sd": 0.0}

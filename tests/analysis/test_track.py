@@ -15,24 +15,24 @@ from wildlab.analysis.pose_noise import (
     pose_numbers,
     premise_numbers,
 )
-from wildlab.analysis.tracks.sighting import (
+from wildlab.analysis.tracks.pixels import (
     CvTuning,
-    Sighting,
+    PixelMeasurements,
     evaluate_measurements,
     evaluate_track,
-    follow_pixels,
-    follow_positions,
-    follow_schmidt,
-    sighting,
+    read_pixels,
     start,
+    track_pixels,
+    track_positions,
+    track_schmidt,
 )
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import project
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.twins import simulate, simulate_twin
+from wildlab.tracking.kalman import Considered
 from wildlab.tracking.run import run_filter
-from wildlab.tracking.schmidt import Considered
 from wildlab.tracking.sensors import POSE, positions
 
 TUNING = CvTuning(acceleration=0.05, position_0=10, velocity_0=10, measurement=7, pixel=30)
@@ -46,8 +46,8 @@ def flight() -> Flight:
 
 
 @pytest.fixture(scope="module")
-def seen(flight: Flight) -> Sighting:
-    return sighting(flight, "mekf")
+def seen(flight: Flight) -> PixelMeasurements:
+    return read_pixels(flight, "mekf")
 
 
 def test_the_truth_of_a_sighting_is_that_of_its_target(flight, seen):
@@ -63,8 +63,8 @@ def test_the_truth_of_a_sighting_is_that_of_its_target(flight, seen):
 
 
 def test_the_sighting_holds_every_frame_between_first_and_last_detection(flight, seen):
-    assert seen.seen.sum() == len(flight.table("detections"))
-    assert seen.seen[0] and seen.seen[-1]
+    assert seen.detected.sum() == len(flight.table("detections"))
+    assert seen.detected[0] and seen.detected[-1]
     assert np.median(np.diff(seen.times)) == pytest.approx(1 / 7.5, rel=0.02)
 
 
@@ -73,7 +73,7 @@ def test_a_detection_seen_from_the_true_pose_lies_on_the_target():
     # what is said of it and does not turn against the airframe.
     exact = load_twin("fast-vessel").model_copy(update={"tolerance": None, "camera_sway": None})
     flight = simulate(exact, 3, ("imu", "gnss"))
-    assert evaluate_measurements(sighting(flight, "truth"))["mae_georeferenced"] < 4.0
+    assert evaluate_measurements(read_pixels(flight, "truth"))["mae_georeferenced"] < 4.0
 
 
 def test_the_compiled_filters_are_the_readable_ones(seen):
@@ -81,9 +81,9 @@ def test_the_compiled_filters_are_the_readable_ones(seen):
     of_pixel = seen.uv, np.eye(2) * TUNING.pixel**2, seen.sensor
     of_place = seen.positions, np.eye(2) * TUNING.measurement**2, positions()
     for follow, measured, pose in (
-        (follow_positions, of_place, None),
-        (follow_pixels, of_pixel, None),
-        (follow_schmidt, of_pixel, Considered(POSE, seen.poses.covariance)),
+        (track_positions, of_place, None),
+        (track_pixels, of_pixel, None),
+        (track_schmidt, of_pixel, Considered(POSE, seen.poses.covariance)),
     ):
         compiled = follow(seen, TUNING)
         readable = run_filter(seen.times, *measured, TUNING.motion, begin, pose=pose)
@@ -96,12 +96,12 @@ def test_the_compiled_filters_are_the_readable_ones(seen):
 def test_without_pose_uncertainty_schmidt_is_the_extended_filter(seen):
     none = np.zeros((len(seen.times), 6, 6))
     np.testing.assert_allclose(
-        follow_schmidt(seen, TUNING, none).x, follow_pixels(seen, TUNING).x, rtol=1e-9, atol=1e-7
+        track_schmidt(seen, TUNING, none).x, track_pixels(seen, TUNING).x, rtol=1e-9, atol=1e-7
     )
 
 
 def test_the_numbers_are_those_of_the_track(seen):
-    track = follow_positions(seen, TUNING)
+    track = track_positions(seen, TUNING)
     scored = evaluate_track(seen, track)
     e = seen.truth[:, :2] - track.x[:, :2]
     assert scored.numbers["mae"] == pytest.approx(np.nanmean(np.hypot(*e.T)))
@@ -114,7 +114,7 @@ def test_the_numbers_are_those_of_the_track(seen):
 
 
 @pytest.fixture(scope="module")
-def own(flight: Flight, seen: Sighting) -> NavigationErrors:
+def own(flight: Flight, seen: PixelMeasurements) -> NavigationErrors:
     return errors_against(flight.nav["truth"], flight.nav["mekf"], seen.times)
 
 
@@ -128,8 +128,8 @@ def test_numbers_of_poses_are_in_metres_and_degrees():
 
 def test_errors_of_the_pose_move_the_target_in_the_image(flight, seen, own):
     """Against projecting it once with the poses and once with the true ones."""
-    rows = np.flatnonzero(seen.seen)
-    true = sighting(flight, "truth").poses.take(rows)
+    rows = np.flatnonzero(seen.detected)
+    true = read_pixels(flight, "truth").poses.take(rows)
     target = np.column_stack([seen.positions[rows], seen.plane_down[rows]])
     uv = [
         project(poses.camera, np.einsum("nji,nj->ni", poses.R_nc, target - poses.p_nc))
@@ -152,7 +152,9 @@ def test_how_a_flight_was_flown(flight, seen):
     assert north["crab"] == pytest.approx(np.degrees(2 * np.pi - 6.2))
 
 
-def flown(flight: Flight, seen: Sighting, roll: float, heading: float, course: float) -> dict[str, float]:
+def flown(
+    flight: Flight, seen: PixelMeasurements, roll: float, heading: float, course: float
+) -> dict[str, float]:
     """`flight_numbers` of an airframe that does the same all the time."""
     truth = flight.nav["truth"].copy()
     q = Rotation.from_matrix(euler_to_matrix(roll, 0.0, heading)).as_quat(scalar_first=True).ravel()

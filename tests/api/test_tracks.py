@@ -14,15 +14,15 @@ from tests.analysis.robots import KNOWN, joined, robot_flight
 from wildlab.analysis.georeference import assumed_deviations, assumed_pose_covariance
 from wildlab.analysis.navigate import PUBLISHED_LIKE, Navigated, Series
 from wildlab.analysis.tracks import tracker
-from wildlab.analysis.tracks.scores import STATE, estimates_table, score_tracks
-from wildlab.analysis.tracks.sighting import (
+from wildlab.analysis.tracks.pixels import (
     FILTERS,
     CvTuning,
     evaluate_track,
-    follow_schmidt,
-    sighting,
+    read_pixels,
+    track_schmidt,
     truth_states,
 )
+from wildlab.analysis.tracks.scores import STATE, estimates_table, score_tracks
 from wildlab.analysis.tracks.single_target import TOGETHER
 from wildlab.api import tracks
 from wildlab.api.tracks import FEW_INDEPENDENT, Consistency
@@ -138,10 +138,10 @@ def test_a_track_is_the_commands(ship):
 @pytest.mark.parametrize("name", ["kf", "ekf", "schmidt"])
 def test_a_tuning_is_that_of_the_studies(ship, name):
     one = wildlab.track(ship, source="autopilot", filter=name, tuning=TUNING)
-    seen = sighting(ship, "autopilot")
+    seen = read_pixels(ship, "autopilot")
     if name == "schmidt":
         P = assumed_pose_covariance(seen.poses.R_nb, assumed_deviations(ship))
-        other = follow_schmidt(seen, TUNING, P)
+        other = track_schmidt(seen, TUNING, P)
     else:
         other = FILTERS[name](seen, TUNING)
     scored = evaluate_track(seen, other)

@@ -133,11 +133,11 @@ def test_a_track_that_goes_on_without_its_target_is_seen():
 def test_names_are_only_text():
     values = [
         GivenValue("targets", "kinds", "**bold** `code`", "stated"),
-        GivenValue("radar", "x", "1", "stated"),
+        GivenValue("radar", "x", "1", "assumed"),
     ]
-    table = page.parameters_table([values[1], values[0], values[1]])
-    assert table["of"].tolist() == ["radar", "radar", "targets"]
-    assert not set("*`") & set(table["value"].iloc[2])
+    table = page.parameters_table(values)
+    assert table["of"].tolist() == ["radar", "targets"]  # first what nobody stated
+    assert not set("*`") & set(table["value"].iloc[1])
     changes = {"targets": {"**x**": TargetLife(61, 0.5, 0.0, 0, 0), "b": TargetLife(61, 0.6, 0.0, 0, 0)}}
     assert "*" not in page.answer(followed(), lives(**changes))[0].values["target"]
 

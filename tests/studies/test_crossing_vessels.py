@@ -12,7 +12,10 @@ from wildlab.studies.crossing_vessels import (
     DISTANCE,
     FEATURES,
     LOOKS,
+    Appearance,
+    Bank,
     Crossing,
+    ImageDetections,
     all_numbers,
     apart_times,
     distances_of,
@@ -24,8 +27,6 @@ from wildlab.studies.crossing_vessels import (
     wrong_of,
 )
 from wildlab.studies.rules import load_rules
-from wildlab.tracking.association import Appearance
-from wildlab.tracking.many.bank import Bank, Looks
 
 INTERVAL = 0.5
 
@@ -40,8 +41,9 @@ def flown(flight):
     """Of a third of the detections, about the crossing."""
     whole = gather(flight)
     kept = (whole.times >= 200) & (whole.times <= 500)
-    rows = kept[np.unique(whole.looks.image, return_inverse=True)[1]]
-    some = whole.looks._replace(image=whole.looks.image[rows], positions=whole.looks.positions[rows])
+    rows = kept[np.unique(whole.detections.image, return_inverse=True)[1]]
+    seen = whole.detections
+    some = seen._replace(image=seen.image[rows], positions=seen.positions[rows])
     crossing = Crossing(some, whole.boat[rows], whole.times[kept], whole.truth[:, kept])
     looks = photograph("crossing-vessels", 6, flight, 2)
     appearance = dressed(crossing, looks, 6)
@@ -58,7 +60,7 @@ def passing(images=600, closest=0.0, noise=0.0, seed=0):
     )
     rng = np.random.default_rng(seed)
     z = truth.transpose(1, 0, 2).reshape(-1, 2) + rng.normal(0, noise, (2 * images, 2))
-    looks = Looks(np.repeat(when, 2), z, INTERVAL)
+    looks = ImageDetections(np.repeat(when, 2), z, INTERVAL)
     return Crossing(looks, np.tile([0, 1], images), when * INTERVAL, truth)
 
 
@@ -82,10 +84,10 @@ def reversing():
     """Two that come near and turn back, which by distance alone looks as if they had passed."""
     crossing = passing()
     half = len(crossing.times) // 2
-    z = crossing.looks.positions.reshape(-1, 2, 2).copy()
+    z = crossing.detections.positions.reshape(-1, 2, 2).copy()
     truth = crossing.truth.copy()
     z[half:], truth[:, half:] = z[half:, ::-1], truth[::-1, half:]
-    return crossing._replace(looks=crossing.looks._replace(positions=z.reshape(-1, 2)), truth=truth)
+    return crossing._replace(detections=crossing.detections._replace(positions=z.reshape(-1, 2)), truth=truth)
 
 
 def test_who_turns_back_is_swapped_by_distance_and_not_by_looks():
@@ -125,13 +127,13 @@ def test_a_swap_is_looked_for_just_after_the_crossing_and_at_the_end(from_s, to_
 def test_detections_are_those_of_the_flight_in_order(flight):
     crossing, seen = gather(flight), observe(flight, "autopilot")
     assert np.bincount(crossing.boat).tolist() == [1535, 865]
-    numbers, counts = np.unique(crossing.looks.image, return_counts=True)
+    numbers, counts = np.unique(crossing.detections.image, return_counts=True)
     assert (counts == 2).sum() == 349
-    assert (np.diff(crossing.looks.image) >= 0).all()
+    assert (np.diff(crossing.detections.image) >= 0).all()
     assert len(crossing.times) == len(numbers)
-    assert crossing.looks.interval == pytest.approx(1 / 7.5, rel=0.01)
-    at = np.searchsorted(numbers, crossing.looks.image)
-    off = np.linalg.norm(crossing.looks.positions - crossing.truth[crossing.boat, at], axis=1)
+    assert crossing.detections.interval == pytest.approx(1 / 7.5, rel=0.01)
+    at = np.searchsorted(numbers, crossing.detections.image)
+    off = np.linalg.norm(crossing.detections.positions - crossing.truth[crossing.boat, at], axis=1)
     assert np.median(off) < 25
     assert len(seen.uv) == len(crossing.boat)
 

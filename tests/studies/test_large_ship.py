@@ -69,7 +69,7 @@ def test_the_ship_is_as_long_as_printed_from_the_printed_height(taken):
 def test_both_tracks_are_of_the_same_images(taken, tracked):
     one, other = tracked[WITH].seen, tracked[WITHOUT].seen
     assert np.array_equal(one.times, other.times)
-    assert np.array_equal(one.seen, other.seen)
+    assert np.array_equal(one.detected, other.detected)
     still = ~tracked[WITH].marks.moved
     assert np.array_equal(one.uv[still], other.uv[still], equal_nan=True)
     assert one.times[0] == 0
@@ -79,7 +79,7 @@ def test_both_tracks_are_of_the_same_images(taken, tracked):
 def test_numbers_are_those_of_the_positions(taken, tracked, numbers):
     seen = tracked[WITH].seen
     points = georeference_pixels(seen.poses, seen.uv, seen.plane_down)[:, :2]
-    off = (seen.truth[:, :2] - points)[seen.seen]
+    off = (seen.truth[:, :2] - points)[seen.detected]
     assert numbers[WITH, "mean_north"] == pytest.approx(off[:, 0].mean())
     assert numbers[WITH, "error_of_mean"] == pytest.approx(np.linalg.norm(off.mean(axis=0)))
     assert numbers[WITH, "sd_both"] ** 2 == pytest.approx(

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from tests.studies.claims import checks_of
-from wildlab.analysis.tracks.sighting import follow_positions, start
+from wildlab.analysis.tracks.pixels import start, track_positions
 from wildlab.errors import WildlabError
 from wildlab.reporting.published import load_claims
 from wildlab.studies import coloured_noise as coloured_noise
@@ -142,7 +142,7 @@ def test_over_detections_alone_is_over_every_frame():
     alone = coloured_noise.track_by_singer(seen, tuning)
     np.testing.assert_allclose(alone.x, every.x, atol=1e-3)
     np.testing.assert_allclose(alone.P[:, :4, :4], every.P[:, :4, :4], rtol=1e-4, atol=1e-4)
-    rows = seen.seen
+    rows = seen.detected
     cv = run_filter(
         seen.times[rows],
         seen.positions[rows],
@@ -152,6 +152,6 @@ def test_over_detections_alone_is_over_every_frame():
         linear_vs_nonlinear.start_on_detections(seen, tuning.cv),
         output_times=seen.times,
     )
-    compiled = follow_positions(seen, tuning.cv)
+    compiled = track_positions(seen, tuning.cv)
     np.testing.assert_allclose(cv.x, compiled.x, atol=1e-3)
     np.testing.assert_allclose(cv.P, compiled.P, rtol=1e-4, atol=1e-4)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wildlab.analysis.pose_noise import covariance_of, pauses
-from wildlab.analysis.tracks.sighting import Sighting, follow_schmidt
+from wildlab.analysis.tracks.pixels import PixelMeasurements, track_schmidt
 from wildlab.errors import WildlabError
 from wildlab.evaluation.pose_noise import KINDS, PoseNoise
 from wildlab.flight.store import Flight
@@ -49,12 +49,12 @@ def flight() -> Flight:
 
 
 @pytest.fixture(scope="module")
-def seen(flight: Flight) -> Sighting:
+def seen(flight: Flight) -> PixelMeasurements:
     return navigated_sighting(flight)
 
 
 @pytest.fixture(scope="module")
-def tracks(flight: Flight, seen: Sighting) -> dict[str, Track]:
+def tracks(flight: Flight, seen: PixelMeasurements) -> dict[str, Track]:
     return compare(seen, sheet_sighting(flight), NOISE)
 
 
@@ -89,7 +89,7 @@ def test_what_each_filter_is_told(tracks, seen):
         "schmidt-1.5-deg-5-m": np.tile(np.diag([25.0] * 3 + [np.radians(1.5) ** 2] * 3), (len(P), 1, 1)),
     }
     for who, covariance in alone.items():
-        own = follow_schmidt(seen, TUNING, covariance)
+        own = track_schmidt(seen, TUNING, covariance)
         np.testing.assert_allclose(tracks[who].x, own.x, rtol=1e-7, err_msg=who)
         np.testing.assert_allclose(tracks[who].P, own.P, rtol=1e-6, err_msg=who)
     sizes = [np.linalg.det(tracks[scaled(factor)].P[-1, :2, :2]) for factor in FACTORS]
@@ -122,7 +122,7 @@ def test_a_logged_flight_is_refused(flight):
         compare_flight(logged, 1)
 
 
-def small(seen: Sighting) -> tuple[Sighting, Track]:
+def small(seen: PixelMeasurements) -> tuple[PixelMeasurements, Track]:
     """Ten frames, a second apart; detections in 0 to 2, in 6 and 7, and in 9: one pause, rows 3 to 5."""
     shown = np.isin(np.arange(10), [0, 1, 2, 6, 7, 9])
     at = np.where(shown[:, None], np.zeros((10, 2)), np.nan)

@@ -18,7 +18,9 @@ from wildlab.studies.static_point import (
     navigate_observers,
     summarise_at_rest,
 )
-from wildlab.tracking.kalman import filter_at_rest
+from wildlab.tracking.motion import rest
+from wildlab.tracking.run import Start, run_filter
+from wildlab.tracking.sensors import positions
 
 
 def test_filtering_errors_is_filtering_positions():
@@ -31,7 +33,8 @@ def test_filtering_errors_is_filtering_positions():
         {"time_s": np.arange(n) * 1.0, "error_north_m": errors[:, 0], "error_east_m": errors[:, 1],
          "cov_nn": C[:, 0, 0], "cov_ne": C[:, 0, 1], "cov_ee": C[:, 1, 1]}
     ).sample(frac=1.0, random_state=1)  # fmt: skip
-    direct = filter_at_rest(errors + truth, C)
+    z = errors + truth
+    direct = run_filter(np.arange(n), z, C, positions(), rest, Start(0.0, z[0], C[0], 0))
     ours = filter_errors(scored)
     assert np.allclose(ours.x, direct.x - truth)
     assert np.allclose(ours.P, direct.P)

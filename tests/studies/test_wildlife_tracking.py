@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from tests.studies.claims import checks_of
-from wildlab.analysis.animals.tracking import (
+from wildlab.analysis.animal_trackers import (
     Found,
     Known,
     Patrolled,
@@ -136,7 +136,7 @@ def found(image: int, animal: int, track: int, **other: float) -> Found:
         "own": 0,
         "away": np.inf,
     }
-    return Found(image, animal, track, other == {}, **(base | other))  # type: ignore[arg-type]
+    return Found(image, animal, track, **(base | other))  # type: ignore[arg-type]
 
 
 def test_out_of_sight_counts_by_hand():

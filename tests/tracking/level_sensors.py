@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wildlab.tracking.schmidt import TOGETHER, Considered
+from wildlab.tracking.kalman import TOGETHER, Considered
 from wildlab.tracking.sensors import Prediction, Sensor, predict_position, predict_range_bearing, row_of
 
 
@@ -13,7 +13,7 @@ def ranges_bearings(platform, yaw):
         return predict_range_bearing(position, row_of(platform, row, 1), row_of(yaw, row, 0))
 
     rows = len(platform) if np.ndim(platform) == 2 else None
-    return Sensor(predict, (False, True), rows, elements=("range", "bearing"))
+    return Sensor(predict, (False, True), rows)
 
 
 def bearings(platform, yaw):
@@ -24,11 +24,7 @@ def bearings(platform, yaw):
         return Prediction(*(one[..., 1:] if i == 0 else one[..., 1:, :]
                             for i, one in enumerate(both.predict(row, position))))  # fmt: skip
 
-    def ray(row, z):
-        bearing = z[0] + row_of(yaw, row, 0)
-        return np.append(row_of(platform, row, 1), 0.0), np.array([np.cos(bearing), np.sin(bearing), 0.0])
-
-    return both._replace(predict=predict, angles=(True,), elements=("bearing",), ray=ray)
+    return both._replace(predict=predict, angles=(True,))
 
 
 def measured_from(platform):
@@ -36,7 +32,6 @@ def measured_from(platform):
     rows = len(platform) if np.ndim(platform) == 2 else None
     return Sensor(
         lambda row, position: predict_position(position, row_of(platform, row, 1)), (False, False), rows,
-        elements=("north", "east"),
     )  # fmt: skip
 
 

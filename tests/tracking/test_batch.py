@@ -12,9 +12,9 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.tracking import sensors as m
 from wildlab.tracking.batch import BatchCamera, run_batch
+from wildlab.tracking.kalman import Considered
 from wildlab.tracking.motion import constant_velocity
 from wildlab.tracking.run import Start, run_filter
-from wildlab.tracking.schmidt import Considered
 
 CV = partial(constant_velocity, sd_acceleration=0.2)
 N = 40

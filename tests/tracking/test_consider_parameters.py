@@ -4,18 +4,17 @@ from functools import partial
 
 import numpy as np
 import pytest
-from hypothesis import given
 
 from tests.tracking.full_filter import beside, full_filter
 from tests.tracking.level_sensors import bearings, consider, ranges_bearings
-from tests.tracking.poses import GENERATORS, overflight
+from tests.tracking.poses import overflight
 from tests.tracking.test_schmidt import growing
 from wildlab.errors import WildlabError
 from wildlab.tracking import sensors as m
 from wildlab.tracking import sensors as p
+from wildlab.tracking.kalman import Considered, consider_all, errors_of
 from wildlab.tracking.motion import constant_velocity, white_acceleration
 from wildlab.tracking.run import Start, run_filter
-from wildlab.tracking.schmidt import Considered, consider_all, errors_of
 from wildlab.tracking.sensors import SensorMeasurements, combined, merge, renamed
 
 CV = partial(constant_velocity, sd_acceleration=0.2)
@@ -61,20 +60,12 @@ def test_each_has_its_own_correlation_time(rng):
         np.testing.assert_allclose(track.P[row], P[:4, :4], rtol=1e-8, atol=1e-10)
 
 
-@given(GENERATORS)
-def test_correlated_errors_of_different_times_stay_a_covariance(rng):
-    A = rng.normal(size=(3, 3 + int(rng.integers(2)))) * np.array([[1.0], [0.01], [5.0]])
-    P = A @ A.T
-    times = tuple(rng.choice([0.0, 0.5, 20.0, np.inf], 3))
-    sensor, names = ranges_bearings([0.0, 0.0], 0.0), ("platform_north", "heading", "platform_east")
-    errors = errors_of(Considered(names, P, times), sensor, 3)
-    left = errors.transition(1, 0.7)
-    grown = P - left @ P @ left.T
-    sd = np.sqrt(np.diag(P))
-    assert np.linalg.eigvalsh(grown / np.outer(sd, sd))[0] > -1e-9
-    alone = errors_of(Considered(names, np.diag(np.diag(P)), times), sensor, 3).transition(1, 0.7)
-    expected = [1.0 if np.isinf(t) else 0.0 if t == 0 else np.exp(-0.7 / t) for t in times]
-    np.testing.assert_allclose(alone, np.diag(expected), atol=1e-12)
+def test_correlated_errors_of_different_times_are_refused():
+    sensor, P = ranges_bearings([0.0, 0.0], 0.0), np.array([[4.0, 1.0], [1.0, 4.0]])
+    pose = Considered(("platform_north", "platform_east"), P, (5.0, np.inf))
+    start = Start(0.0, np.zeros(4), np.eye(4))
+    with pytest.raises(WildlabError, match=r"^pose.correlation_time: .*correlated"):
+        run_filter([1.0], [[9.0, 0.0]], np.eye(2), sensor, CV, start, pose=pose)
 
 
 def test_sets_of_errors_join_and_split():
@@ -157,9 +148,9 @@ def one_after_the_other(merged, parts, pose=None):
 def test_rows_are_filtered_each_by_its_sensor():
     parts = crew()
     merged = merge(parts)
-    assert merged.measurements.shape == (60, 2) and (np.diff(merged.times) >= 0).all()
+    assert merged.measurements.shape == (60, 1, 2) and (np.diff(merged.times) >= 0).all()
     mast = merged.which == 1
-    assert np.isnan(merged.measurements[mast, 1]).all() and np.isfinite(merged.measurements[~mast]).all()
+    assert np.isnan(merged.measurements[mast, :, 1]).all() and np.isfinite(merged.measurements[~mast]).all()
     track = run_filter(*merged[:4], WA, THERE)
     x, nis = one_after_the_other(merged, parts)
     same = np.append(np.diff(merged.times) > 0, True)  # at one instant: the state after both

@@ -14,16 +14,14 @@ from wildlab.errors import WildlabError
 from wildlab.tracking import sensors as m
 from wildlab.tracking.batch import BatchCamera, run_batch
 from wildlab.tracking.filters import run_coloured, run_imm, run_unscented
-from wildlab.tracking.initiation import start_from_first
-from wildlab.tracking.kalman import filter_at_rest, predict, update
+from wildlab.tracking.kalman import Considered, predict, update
 from wildlab.tracking.motion import (
     constant_velocity,
     in_steps,
     random_walk,
     rest,
 )
-from wildlab.tracking.run import Start, run_filter
-from wildlab.tracking.schmidt import Considered
+from wildlab.tracking.run import Start, run_filter, start_from_first
 
 
 def test_predict_and_update_agree_with_filterpy_over_random_models(rng):
@@ -57,19 +55,10 @@ def test_at_rest_the_filter_is_the_weighted_mean(rng):
     information = np.linalg.inv(R)
     P = np.linalg.inv(information.sum(axis=0))
     mean = P @ np.einsum("nij,nj->i", information, z)
-    filtered = filter_at_rest(z, R)
+    start = Start(0.0, z[0], R[0], 0)
+    filtered = run_filter(np.arange(len(z)), z, R, m.positions(), rest, start)
     assert np.allclose(filtered.x[-1], mean)
     assert np.allclose(filtered.P[-1], P)
-
-
-def test_a_missing_measurement_carries_the_estimate_on():
-    z = np.array([[np.nan, 0], [1.0, 2.0], [np.nan, np.nan], [3.0, 4.0]])
-    filtered = filter_at_rest(z, np.tile(np.eye(2), (4, 1, 1)))
-    assert np.isnan(filtered.x[0]).all()
-    assert np.allclose(filtered.x[1:], [[1, 2], [1, 2], [2, 3]])
-    assert np.isnan(filtered.innovation[:3]).all()
-    assert np.allclose(filtered.innovation[3], [2, 2])
-    assert np.isnan(filter_at_rest(z * np.nan, np.tile(np.eye(2), (4, 1, 1))).x).all()
 
 
 CV = partial(constant_velocity, sd_acceleration=0.2)
@@ -269,11 +258,10 @@ def by_batch(start=KNOWN, **options):
 FILTERS = [by_kalman, by_coloured, by_unscented, by_imm, by_batch]
 
 
-@pytest.mark.parametrize("run", FILTERS[:-1])
 @pytest.mark.parametrize("wrong", [0.0, 1.0001, np.nan])
-def test_a_gate_is_a_probability(run, wrong):
+def test_a_gate_is_a_probability(wrong):
     with pytest.raises(WildlabError, match=r"^gate_probability: "):
-        run(gate_probability=wrong)
+        by_kalman(gate_probability=wrong)
 
 
 def spoilt(value, at=(1, 1)):

@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 
 from tests.tracking.full_filter import beside, full_filter
 from tests.tracking.poses import GENERATORS, overflight
-from wildlab.tracking import schmidt
+from wildlab.tracking import kalman
 from wildlab.tracking import sensors as m
+from wildlab.tracking.kalman import Considered
 from wildlab.tracking.motion import constant_velocity
 from wildlab.tracking.run import Start, run_filter
-from wildlab.tracking.schmidt import Considered
 
 CV = partial(constant_velocity, sd_acceleration=0.2)
 PIXELS = 4.0 * np.eye(2)
@@ -116,7 +116,7 @@ def test_update_is_the_print(rng):
     J = A @ A.T
     P, C, Po = J[:4, :4], J[:4, 4:], J[4:, 4:]
     H, Ho, R, v = rng.normal(size=(2, 4)), rng.normal(size=(2, 6)), np.diag([1.0, 2.0]), rng.normal(size=2)
-    done = schmidt.update_schmidt(np.zeros(4), P, C, Po, v, H, Ho, R)
+    done = kalman.update_schmidt(np.zeros(4), P, C, Po, v, H, Ho, R)
     S = H @ P @ H.T + H @ C @ Ho.T + Ho @ C.T @ H.T + Ho @ Po @ Ho.T + R
     K = (P @ H.T + C @ Ho.T) @ np.linalg.inv(S)
     left = np.eye(4) - K @ H
@@ -137,16 +137,16 @@ def test_a_cross_covariance_is_shortened_only_where_it_must_be(rng, shrink):
     A = rng.normal(size=(10, 14)) * np.concatenate([np.array([5, 5, 1, 1.0]), UNITS])[:, None]
     J = A @ A.T
     P, C, Po = J[:4, :4], J[:4, 4:], J[4:, 4:]
-    same, limited = schmidt.limit_cross(C, P, Po)
+    same, limited = kalman.limit_cross(C, P, Po)
     assert same is C
     assert not limited
     mixed = np.diag(rng.uniform(shrink, 1, 6) ** 0.5)
     after = mixed @ Po @ mixed
     sound = lowest(P, C, after) > 1e-9
-    new, limited = schmidt.limit_cross(C, P, after)
+    new, limited = kalman.limit_cross(C, P, after)
     assert limited == (not sound)
     assert lowest(P, new, after) > -1e-12
-    again, limited = schmidt.limit_cross(new, P, after)
+    again, limited = kalman.limit_cross(new, P, after)
     assert np.allclose(again, new, rtol=1e-8)
 
 
@@ -154,14 +154,14 @@ def test_a_cross_covariance_is_shortened_only_where_it_must_be(rng, shrink):
 def test_transitions_lead_from_one_pose_covariance_to_the_next(rng):
     before, after = random_pose_covariance(rng, 1.0), random_pose_covariance(rng, 1.0)
     unit = np.outer(UNITS, UNITS)
-    bias = schmidt.transition_of_pose(before, after)
+    bias = kalman.transition_of_pose(before, after)
     assert np.allclose(bias @ before @ bias.T / unit, after / unit, rtol=1e-7, atol=1e-9)
-    back = schmidt.transition_of_pose(after, before)
+    back = kalman.transition_of_pose(after, before)
     assert np.allclose(back @ bias * np.outer(1 / UNITS, UNITS), np.eye(6), atol=1e-6)
     degrees = np.repeat([1.0, np.degrees(1)], 3)
     scale = np.outer(degrees, degrees)
-    assert np.allclose(schmidt.transition_of_pose(before, before), np.eye(6), atol=1e-8)
-    other = schmidt.transition_of_pose(before * scale, after * scale)
+    assert np.allclose(kalman.transition_of_pose(before, before), np.eye(6), atol=1e-8)
+    other = kalman.transition_of_pose(before * scale, after * scale)
     assert np.allclose(
         other * np.outer(1 / degrees / UNITS, degrees * UNITS), bias * np.outer(1 / UNITS, UNITS), atol=1e-6
     )
@@ -170,7 +170,7 @@ def test_transitions_lead_from_one_pose_covariance_to_the_next(rng):
 def test_a_row_without_a_pose_covariance_is_passed_over(rng):
     covariances = np.array([random_pose_covariance(rng) for _ in range(4)])
     covariances[1] = np.nan
-    phi = schmidt.transitions_of_pose(covariances)
+    phi = kalman.transitions_of_pose(covariances)
     assert np.array_equal(phi[:2], [np.eye(6)] * 2)
     assert np.allclose(phi[2] @ covariances[0] @ phi[2].T, covariances[2])
 
@@ -182,11 +182,11 @@ def test_many_transitions_are_those_of_each_pair(rng):
     covariances[5, 2] = covariances[5, :, 2] = 0.0
     covariances[7] = 0.0
     covariances[9] = np.outer(np.arange(1, 7), np.arange(1, 7)) * 1e-4
-    phi = schmidt.transitions_of_pose(covariances)
+    phi = kalman.transitions_of_pose(covariances)
     for k in range(1, 12):
-        expected = schmidt.transition_of_pose(covariances[k - 1], covariances[k])
+        expected = kalman.transition_of_pose(covariances[k - 1], covariances[k])
         assert np.allclose(phi[k], np.eye(6) if k == 3 else expected, rtol=1e-6, atol=1e-6), k
-    assert schmidt.transitions_of_pose(covariances[:1]) == pytest.approx(np.eye(6)[None])
+    assert kalman.transitions_of_pose(covariances[:1]) == pytest.approx(np.eye(6)[None])
 
 
 def hard_flight(n, seed=0):

@@ -13,7 +13,7 @@ from wildlab.analysis.georeference import (
 )
 from wildlab.analysis.navigate import AXES, PLACES, NavigationErrors, errors_against
 from wildlab.analysis.navigation_inputs import VELOCITY
-from wildlab.analysis.tracks.sighting import Sighting
+from wildlab.analysis.tracks.pixels import PixelMeasurements
 from wildlab.errors import WildlabError
 from wildlab.evaluation.correlated_errors import WanderNoise
 from wildlab.evaluation.errors import SLOWEST_M_S
@@ -33,20 +33,20 @@ _POSE = [0, 1, 2, 6, 7, 8]
 NAMES = (*PLACES, *AXES)
 
 
-def pauses(seen: Sighting) -> list[Indices]:
+def pauses(seen: PixelMeasurements) -> list[Indices]:
     """Rows of the frames of each pause, from the first to the last without a detection.
 
     Parameters
     ----------
     seen
-        From `wildlab.analysis.tracks.sighting.sighting`.
+        From `wildlab.analysis.tracks.pixels.read_pixels`.
 
     Returns
     -------
     list of (K,) arrays
         In order of time; empty where no two detections are further apart than `PAUSE_S`.
     """
-    rows = np.flatnonzero(seen.seen)
+    rows = np.flatnonzero(seen.detected)
     long = np.flatnonzero(np.diff(seen.times[rows]) > PAUSE_S)
     return [np.arange(rows[i] + 1, rows[i + 1]) for i in long]
 
@@ -72,7 +72,9 @@ def pose_numbers(own: NavigationErrors) -> dict[str, float]:
     return numbers
 
 
-def premise_numbers(flight: Flight, seen: Sighting, source: str, own: NavigationErrors) -> dict[str, float]:
+def premise_numbers(
+    flight: Flight, seen: PixelMeasurements, source: str, own: NavigationErrors
+) -> dict[str, float]:
     """What sentences on the poses speak of; degrees.
 
     Parameters
@@ -106,14 +108,14 @@ def premise_numbers(flight: Flight, seen: Sighting, source: str, own: Navigation
     turns = np.abs(matrix_to_euler(seen.poses.R_nb)[:, 0]) > TURNING
     for word, rows in (("turning", turns), ("straight", ~turns)):
         numbers[f"difference_{word}"] = shown("roll", rms(beside.error[rows, 6]))
-    rows = np.flatnonzero(seen.seen)
+    rows = np.flatnonzero(seen.detected)
     J = ground_jacobians(seen.poses.take(rows), seen.uv[rows], seen.plane_down[rows])
     shift = np.linalg.solve(J.pixel, J.pose @ own.error[rows][:, _POSE, None])
     far = np.hypot(*shift[:, :, 0].T)
     return numbers | {"shift_px": rms(shift.ravel()), "largest_shift_px": float(np.nanmax(far))}
 
 
-def flight_numbers(flight: Flight, seen: Sighting) -> dict[str, float]:
+def flight_numbers(flight: Flight, seen: PixelMeasurements) -> dict[str, float]:
     """How a twin was flown, and over what.
 
     Parameters
@@ -137,7 +139,7 @@ def flight_numbers(flight: Flight, seen: Sighting) -> dict[str, float]:
     turns = np.abs(roll) > TURNING
     crab = wrap(yaw - np.arctan2(east, north))[~turns & np.isfinite(p[:, 0])]
     return {
-        "detections": float(seen.seen.sum()),
+        "detections": float(seen.detected.sum()),
         "pauses": float(len(pauses(seen))),
         "turning": float(turns.mean()),
         "moving": mean(np.hypot(*seen.truth[:, 2:].T) > SLOWEST_M_S),
@@ -242,7 +244,7 @@ def used_deviations(observations: Observations, assumed: dict[str, float] | None
     }
 
 
-def estimate_from_sighting(flight: Flight, seen: Sighting) -> PoseNoise:
+def estimate_from_sighting(flight: Flight, seen: PixelMeasurements) -> PoseNoise:
     """Standard deviations of the poses of a camera that followed a target whose positions are known.
 
     As `estimate_noise`, but the attitude's errors are counted in b, as in H (7.39), and the prior lies about
@@ -254,7 +256,7 @@ def estimate_from_sighting(flight: Flight, seen: Sighting) -> PoseNoise:
     flight
         What it states of the pixel and of the ground's height is assumed.
     seen
-        From `wildlab.analysis.tracks.sighting.sighting`, with truth.
+        From `wildlab.analysis.tracks.pixels.read_pixels`, with truth.
 
     Returns
     -------
@@ -269,7 +271,7 @@ def estimate_from_sighting(flight: Flight, seen: Sighting) -> PoseNoise:
         raise WildlabError(
             "the poses have no covariance to begin with", "use those of the MEKF: navigate_mekf(flight)"
         )
-    rows = np.flatnonzero(seen.seen & np.isfinite(seen.truth[:, :2]).all(axis=1))
+    rows = np.flatnonzero(seen.detected & np.isfinite(seen.truth[:, :2]).all(axis=1))
     slots = np.floor((seen.times[rows] - seen.times[0]) / APART_S)
     rows = rows[np.unique(slots, return_index=True)[1]]
     if len(rows) < 3:

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from wildlab.analysis.georeference import covariances_of
-from wildlab.api.points import PointErrors, Points
+from wildlab.api.flights import PointErrors, Points
 from wildlab.api.tracks import Consistency, Navigation, Tracked
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import chi_square_interval

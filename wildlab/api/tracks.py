@@ -32,8 +32,8 @@ from wildlab.analysis.navigate import (
     summarise,
 )
 from wildlab.analysis.tracks import tracker
+from wildlab.analysis.tracks.pixels import FILTERS, CvTuning, read_pixels, track_schmidt
 from wildlab.analysis.tracks.scores import FEW_INDEPENDENT, seen_of, verdict, worth_of_errors
-from wildlab.analysis.tracks.sighting import FILTERS, CvTuning, follow_schmidt, sighting
 from wildlab.analysis.tracks.single_target import SMOOTHED, TOGETHER, SensorTrack
 from wildlab.analysis.tracks.tracker import WHITE, TrackingResult
 from wildlab.errors import WildlabError
@@ -111,7 +111,7 @@ def navigate(flight: Flight, method: Method = "mekf", tuning: MekfTuning | None 
         ``"mekf"``, the error-state filter of H 7.3, with covariance; or ``"observer"``, the nonlinear
         observer of H 5.5, without.
     tuning
-        Noise that the filter is told of in place of what the manifest states, for instance
+        Noise that the filter is given of in place of what the manifest states, for instance
         `wildlab.analysis.navigate.PUBLISHED_LIKE`; for ``"mekf"`` only.
 
     Returns
@@ -156,22 +156,22 @@ def navigate(flight: Flight, method: Method = "mekf", tuning: MekfTuning | None 
 
 @dataclass(frozen=True, repr=False)
 class Tracked(Brief):
-    """One target followed by one filter, look by look.
+    """One target followed by one filter, scan by scan.
 
     Attributes
     ----------
     flight, sensor, target, filter
         Their names; the sensor is ``"together"`` where several look.
     times
-        (N,) of the looks, s.
+        (N,) of the scans, s.
     estimate, covariance
         (N, 4) north, east (m) and their velocities (m/s), and (N, 4, 4); NaN where there is no track.
     error
         (N, 4) truth minus estimate; NaN without a track or truth.
     used
-        (N,) looks whose detection the filter used, the one that it starts on among them.
+        (N,) scans whose detection the filter used, the one that it starts on among them.
     judged
-        (N,) looks that the numbers are of: at which the target was in sight; all, with a tuning, as in H.
+        (N,) scans that the numbers are of: at which the target was in sight; all, with a tuning, as in H.
     measured
         (N, 2) north and east, m, of the detection that was used; NaN where there was none, or it is no place
         by itself.
@@ -181,8 +181,8 @@ class Tracked(Brief):
         (N,) of the position, and of the detections.
     dof
         Elements of a detection, on average: what the mean NIS should be.
-    told
-        What the filter was told: what, how much and who says so.
+    given
+        What the filter was given: what, how much and who says so.
     """
 
     flight: str
@@ -200,7 +200,7 @@ class Tracked(Brief):
     nees: Array
     nis: Array
     dof: float
-    told: tuple[tuple[str, str], ...]
+    given: tuple[tuple[str, str], ...]
 
     @property
     def truth(self) -> Array:
@@ -218,7 +218,7 @@ class Tracked(Brief):
     def brief(self) -> Summary:
         """What was followed with what, and how far off it was."""
         n = self.numbers
-        rows = [("filter", f"{self.filter}, by {self.sensor}"), *self.told]
+        rows = [("filter", f"{self.filter}, by {self.sensor}"), *self.given]
         rows.append(("detections used", f"{int(self.used.sum())} in {np.ptp(self.times):.0f} s"))
         if np.isfinite(n["mae"]):
             where = "with or without a detection" if self.judged.all() else "while it was in sight"
@@ -258,7 +258,7 @@ def track(
     sensor
         Its name. Left out: the one that detected something, or all of several together.
     settings
-        What is told of sensors and targets: a ``settings.toml``, or the same as a mapping.
+        What is given of sensors and targets: a ``settings.toml``, or the same as a mapping.
     smooth
         Backwards in time as well.
     tuning
@@ -289,18 +289,18 @@ def track(
                 field="tuning",
             )
         return _as_tuned(flight, target, source, filter or "schmidt", tuning)
-    told = settings
-    if told is not None and not isinstance(told, (str, Path, Mapping, Settings)):
+    stated = settings
+    if stated is not None and not isinstance(stated, (str, Path, Mapping, Settings)):
         raise WildlabError(
-            f"settings are a {type(told).__name__}", "give a file or a mapping", field="settings"
+            f"settings are a {type(stated).__name__}", "give a file or a mapping", field="settings"
         )
-    if isinstance(told, (str, Path)):
-        told = read_settings(Path(told))
-    elif isinstance(told, Mapping):
-        told = check_model(Settings, told, None)
+    if isinstance(stated, (str, Path)):
+        stated = read_settings(Path(stated))
+    elif isinstance(stated, Mapping):
+        stated = check_model(Settings, stated, None)
     found = tracker.track(
         flight,
-        settings=told,
+        settings=stated,
         filters=[] if filter is None else [filter],
         targets=[] if target is None else [target],
         sensors=[] if sensor is None else [sensor],
@@ -312,8 +312,8 @@ def track(
         raise WildlabError(
             f"there are {len(names)} targets", f"name one of {', '.join(names)}", field="target"
         )
-    looks = found.tracks[-1].sensor if len(found.scans) == 1 else TOGETHER
-    by_filter = {one.filter.removesuffix(SMOOTHED): one for one in found.tracks if one.sensor == looks}
+    by = found.tracks[-1].sensor if len(found.scans) == 1 else TOGETHER
+    by_filter = {one.filter.removesuffix(SMOOTHED): one for one in found.tracks if one.sensor == by}
     wanted = WHITE if filter == "kf" else filter or ("schmidt" if "schmidt" in by_filter else WHITE)
     if wanted not in by_filter:
         raise WildlabError(
@@ -328,15 +328,15 @@ def _as_followed(flight: Flight, found: TrackingResult, one: SensorTrack, source
     of = {"targets", *(found.scans if one.sensor == TOGETHER else (one.sensor,))}
     about = [each for each in found.given if each.subject in of]
     several = len(of) > 2
-    told = [
+    given = [
         (f"{each.subject}: {each.what}" if several else each.what, f"{each.value} ({each.source})")
         for each in about
     ]
-    told += [("note", note) for note in found.notes]
+    given += [("note", note) for note in found.notes]
     return Tracked(
         flight.name, one.sensor, one.target, one.filter, one.times, one.estimate, one.covariance, one.error,
         one.detection != "", seen_of(one), _places(flight, found, one, source), one.innovation, one.nees,
-        one.nis, one.dof, tuple(told),
+        one.nis, one.dof, tuple(given),
     )  # fmt: skip
 
 
@@ -366,16 +366,16 @@ def _as_tuned(
             f"there is no filter {filter!r} with a tuning", f"use one of {', '.join(FILTERS)}", field="filter"
         )
     name, _ = flight.pose_source(source)
-    seen = sighting(flight, name, target)
+    seen = read_pixels(flight, name, target)
     assumed = filter == "schmidt" and seen.poses.covariance is None
     if assumed:
         P = assumed_pose_covariance(seen.poses.R_nb, assumed_deviations(flight))
-        found = follow_schmidt(seen, tuning, P)
+        found = track_schmidt(seen, tuning, P)
     else:
         found = FILTERS[filter](seen, tuning)
     error = seen.truth - found.x[:, :4]
     noise = f"{tuning.measurement:.3g} m" if filter == "kf" else f"{tuning.pixel:.3g} px"
-    told = (
+    given = (
         ("acceleration, measurement", f"{tuning.acceleration:g} m/s^2, {noise}"),
         ("at the start", f"{tuning.position_0:.3g} m, {tuning.velocity_0:.3g} m/s"),
         ("poses", f"{name}, uncertainty assumed" if assumed else name),
@@ -387,8 +387,8 @@ def _as_tuned(
     sensor, called = (str(pixels[column].iloc[0]) for column in ("source", "target_id"))
     return Tracked(
         flight.name, sensor, called, filter, seen.times, found.x[:, :4], found.P[:, :4, :4], error,
-        seen.seen, np.ones(len(seen.times), bool), seen.positions, found.innovation, nees, found.nis, 2.0,
-        told,
+        seen.detected, np.ones(len(seen.times), bool), seen.positions, found.innovation, nees, found.nis, 2.0,
+        given,
     )  # fmt: skip
 
 
@@ -417,12 +417,12 @@ class Consistency(Brief):
         """A row for each mean."""
         rows = []
         for name, a in self.means.items():
-            said = verdict(a)
+            word = verdict(a)
             if not a.inside and a.worth < FEW_INDEPENDENT:
-                said += ", but on few independent values"
+                word += ", but on few independent values"
             count = f"{a.n}, worth {a.worth:.0f}"
             dof = f"{self.series[name][0].dof:.3g}"
-            rows.append((name, f"{a.mean:.2f}", dof, f"{a.low:.2f} to {a.high:.2f}", count, said))
+            rows.append((name, f"{a.mean:.2f}", dof, f"{a.low:.2f} to {a.high:.2f}", count, word))
         head = ("mean of", "is", "should be", "95 % interval", "values", "so the filter is")
         return Summary("Consistency", rows, head)
 
@@ -432,7 +432,7 @@ def consistency(
 ) -> Consistency:
     """Mean NEES and NIS of one run, or of several independent ones, beside what they should be.
 
-    Of a track: the NEES of its position (two degrees of freedom) at the looks that it is judged at, and the
+    Of a track: the NEES of its position (two degrees of freedom) at the scans that it is judged at, and the
     NIS of its detections (as many as they have elements). Of a navigation: the NEES of position, velocity and
     attitude (three each) in that part of the flight which counts. Values of one run are correlated, so each
     run counts as what its values are worth, an error that lasts as one. That is an estimate from the same
@@ -487,7 +487,7 @@ def consistency(
     elif errors is not None or len({type(one) for one in results}) != 1:
         raise WildlabError(
             "results of one kind are needed",
-            "give tracks, or navigations, or errors with their covariances",
+            "give tracks, navigations, or errors with covariances",
             field="results",
         )
     for one in results:
@@ -495,8 +495,8 @@ def consistency(
             gathered.setdefault(series.name, []).append(series)
     if not gathered:
         raise WildlabError(
-            "there is nothing to judge: no truth, no covariance and no innovation",
-            "give results of a flight with truth, or a filter with a covariance",
+            "there is nothing to judge: no truth, covariance or innovation",
+            "give a flight with truth",
             field="results",
         )
     means = {name: mean_of_runs(runs) for name, runs in gathered.items()}

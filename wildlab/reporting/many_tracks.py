@@ -1,6 +1,6 @@
 """The page on many targets at once: who has a track, whether it stays on its target, and what is on nothing.
 
-What is said follows by rules from what was tracked and how it compares with the truth; the words lie in
+What the page says follows by rules from what was tracked and how it compares with the truth; the words lie in
 ``data/messages/en/tracking-many.toml``.
 """
 
@@ -12,8 +12,7 @@ import numpy as np
 import pandas as pd
 
 from wildlab.analysis.tracks.ground_positions import counts_twice, platform_errors
-from wildlab.analysis.tracks.many import HERE, ManyTracks
-from wildlab.analysis.tracks.noise_model import GivenValue
+from wildlab.analysis.tracks.many import ManyTracks
 from wildlab.analysis.tracks.scores import FEWEST
 from wildlab.evaluation.identities import Gospa, Identities
 from wildlab.messages.catalogue import Message, load_texts
@@ -21,6 +20,7 @@ from wildlab.messages.quantities import length, percent_of
 from wildlab.names import listed
 from wildlab.reporting.charts import many as charts
 from wildlab.reporting.report import Report, Wording
+from wildlab.reporting.tracking import count_assumed, parameters_table, plain
 from wildlab.tracking.many.tracks import Count, count_interval, count_probabilities
 
 #: A target is tracked well where it has a track at this share of the scans at which it can be seen; below
@@ -37,14 +37,14 @@ SMALLEST, LARGEST = 0.5, 2.0
 
 
 def counts_of(shown: ManyTracks) -> tuple[int, float]:
-    """How many tracks there are in all, and at a look in the mean."""
-    names = {int(one) for look in shown.shown for one in look.identity}
-    return len(names), float(np.mean([len(look.identity) for look in shown.shown])) if shown.shown else 0.0
+    """How many tracks there are in all, and at a scan in the mean."""
+    names = {int(one) for scan in shown.shown for one in scan.identity}
+    return len(names), float(np.mean([len(scan.identity) for scan in shown.shown])) if shown.shown else 0.0
 
 
 def most_at_once(followed: ManyTracks) -> Count:
-    """How many targets there are at the look that has most, with a 90 % interval, as tracks may be false."""
-    expected = [float(look.existence.sum()) for look in followed.shown]
+    """How many targets there are at the scan that has most, with a 90 % interval, as tracks may be false."""
+    expected = [float(scan.existence.sum()) for scan in followed.shown]
     if not expected:
         return count_interval(count_probabilities([]))
     return count_interval(count_probabilities(followed.shown[int(np.argmax(expected))].existence))
@@ -57,13 +57,13 @@ def rms_error(lives: Identities) -> float:
 
 
 def on_target(lives: Identities) -> int:
-    """How often a target that could be seen had a track, looks and targets counted together."""
+    """How often a target that could be seen had a track, scans and targets counted together."""
     could = sum(life.visible for life in lives.targets.values())
     return could - sum(one.n_missed for one in lives.gospa)
 
 
 def false_share(lives: Identities) -> float:
-    """Of how many looks a track is on nothing."""
+    """Of how many scans a track is on nothing."""
     return float(np.mean([one.n_false > 0 for one in lives.gospa]))
 
 
@@ -88,7 +88,7 @@ def needed_reach(followed: ManyTracks) -> float:
 
     0 where what is taken suffices.
     """
-    covariances = [look.P[:, :2, :2] for look in followed.shown if len(look.P)]
+    covariances = [scan.P[:, :2, :2] for scan in followed.shown if len(scan.P)]
     widest = 0.0
     if covariances:
         widest = float(np.median(np.sqrt(np.linalg.eigvalsh(np.concatenate(covariances))[:, -1])))
@@ -232,9 +232,9 @@ def tracks_table(followed: ManyTracks, lives: Identities | None) -> pd.DataFrame
     rows = []
     hulls = [hull.name for hull in followed.targets.hulls]
     spans: dict[int, list[tuple[float, int]]] = {}
-    for look in followed.shown:
-        for i, identity in enumerate(look.identity):
-            spans.setdefault(int(identity), []).append((look.time, int(np.argmax(look.kinds[i]))))
+    for scan in followed.shown:
+        for i, identity in enumerate(scan.identity):
+            spans.setdefault(int(identity), []).append((scan.time, int(np.argmax(scan.kinds[i]))))
     start = followed.scans[0].time if followed.scans else 0.0
     for identity, span in spans.items():
         times = [time for time, _ in span]
@@ -273,29 +273,6 @@ def parts_table(found: Sequence[Gospa]) -> pd.DataFrame:
         share = 100 * square / every if every else np.nan
         rows.append({"part": names[key], "metres": float(np.sqrt(square)), "share": share})
     return pd.DataFrame(rows)
-
-
-def parameters_table(said: Sequence[GivenValue]) -> pd.DataFrame:
-    """Every value that the tracker was given, subject by subject; a name in it is only text."""
-    subjects = list(dict.fromkeys(one.subject for one in said))
-    return pd.DataFrame(
-        [
-            {"of": plain(one.subject), "what": one.what, "value": plain(one.value), "source": one.source}
-            for one in sorted(said, key=lambda one: subjects.index(one.subject))
-        ]
-    )
-
-
-def count_assumed(said: Sequence[GivenValue]) -> dict[str, str]:
-    """How many of the given values are assumed, and estimated on this flight, for captions."""
-    assumed = sum(one.source.startswith("assumed") for one in said)
-    here = sum(one.source.startswith(HERE) for one in said)
-    return {"values": str(len(said)), "assumed": str(assumed), "here": str(here)}
-
-
-def plain(text: str) -> str:
-    """A name without the signs by which a page sets words bold or as code."""
-    return text.replace("*", "∗").replace("`", "ˋ")
 
 
 # -- what is recorded, and the page

@@ -1,6 +1,6 @@
 """The page on a flight's tracks: how wrong they are, and whether their filters know.
 
-What is said follows by rules from `wildlab.analysis.tracks.scores.score_tracks`; the words lie in
+What the page says follows by rules from `wildlab.analysis.tracks.scores.score_tracks`; the words lie in
 ``data/messages/en/tracking.toml``.
 """
 
@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from wildlab.analysis.tracks.noise_model import ROUGH, GivenValue, Tuned
+from wildlab.analysis.tracks.noise_model import HERE, GivenValue, Tuned
 from wildlab.analysis.tracks.scores import (
     CAUTIOUS,
     CONSISTENT,
@@ -70,12 +70,16 @@ def band_name(name: str, end: str) -> str:
     return f"{name}_band_{end}"
 
 
+def _subject(row: pd.Series) -> str:
+    return f"{row['sensor']}/{row['target']}/{row['filter']}".replace(" ", "-")
+
+
 def record(report: Report, rows: pd.DataFrame) -> None:
     """The numbers of every track, for ``metrics.json``, and which filter the page speaks of."""
     if len(rows):
         report.metric(LEADING, leading_filter(rows), 1, "1")
     for _, row in rows.iterrows():
-        subject = f"{row['sensor']}/{row['target']}/{row['filter']}".replace(" ", "-")
+        subject = _subject(row)
         for name, column, unit, low, high, n in _RECORDED:
             if not np.isfinite(row[column]):
                 continue
@@ -84,21 +88,14 @@ def record(report: Report, rows: pd.DataFrame) -> None:
                 for end in ("low", "high"):
                     if np.isfinite(row[f"{name}_{end}"]):
                         report.metric(band_name(name, end), subject, float(row[f"{name}_{end}"]), "1")
-            report.metric(
-                name,
-                subject,
-                float(row[column]),
-                unit,
-                n=None if n is None else int(row[n]),
-                low=None if low is None else float(row[low]),
-                high=None if high is None else float(row[high]),
-            )
+            more = {key: row[of] for key, of in (("n", n), ("low", low), ("high", high)) if of is not None}
+            report.metric(name, subject, float(row[column]), unit, **more)
 
 
 def record_restarts(report: Report, rows: pd.DataFrame) -> None:
-    """How often each track was reinitialised, and at how many looks there was none."""
+    """How often each track was reinitialised, and at how many scans there was none."""
     for _, row in rows[rows["spanned"] > 0].iterrows():
-        subject = f"{row['sensor']}/{row['target']}/{row['filter']}".replace(" ", "-")
+        subject = _subject(row)
         report.metric("started_anew", subject, int(row["restarts"]), "1")
         report.metric("looks_without_track", subject, int(row["untracked"]), "1", n=int(row["spanned"]))
 
@@ -257,8 +254,8 @@ def _beside(
     if "restarts" in rows:
         each = rows.drop_duplicates(["sensor", "target"])
         if restarts := int(each["restarts"].sum()):
-            gone, looks = int(each["untracked"].sum()), int(each["spanned"].sum())
-            return Message("restarted", {"times": str(restarts), "gone": str(gone), "looks": str(looks)})
+            gone, scans = int(each["untracked"].sum()), int(each["spanned"].sum())
+            return Message("restarted", {"times": str(restarts), "gone": str(gone), "looks": str(scans)})
     if not with_truth:
         used = [one for one in pairs if one.filter == mine["filter"].iloc[0]]
         if not used:
@@ -272,12 +269,6 @@ def _beside(
             "times": significant(float(np.sqrt(one.squares.mean / 2))),
         }
         return Message("apart", values)
-    white = rows[(rows["filter"] == "ekf") & (rows["compared"] > 0) & (rows["kind"] != TOGETHER)]
-    if len(white) and mine["filter"].iloc[0] != "ekf":
-        return Message("ekf", {"times": significant(float(np.sqrt(white["nees"].median() / 2)))})
-    unseen = mine[mine["without"] > 0]
-    if len(unseen):
-        return Message("unseen", {"rmse": length(float(unseen["rmse_without"].median()))})
     return None
 
 
@@ -383,19 +374,27 @@ def apart_table(pairs: Sequence[SensorPair]) -> pd.DataFrame:
     )
 
 
-def parameters_table(said: Sequence[GivenValue]) -> pd.DataFrame:
-    """What filters were given, first what is assumed or estimated on this flight."""
-    ordered = sorted(said, key=lambda one: not (one.source.startswith("assumed") or one.source == ROUGH))
+def parameters_table(given: Sequence[GivenValue]) -> pd.DataFrame:
+    """What filters were given, first what is assumed or estimated on this flight; a name is only text."""
+    ordered = sorted(given, key=lambda one: not one.source.startswith(("assumed", HERE)))
     return pd.DataFrame(
-        [{"of": one.subject, "what": one.what, "value": one.value, "source": one.source} for one in ordered]
+        [
+            {"of": plain(one.subject), "what": one.what, "value": plain(one.value), "source": one.source}
+            for one in ordered
+        ]
     )
 
 
-def count_assumed(said: Sequence[GivenValue]) -> dict[str, str]:
+def count_assumed(given: Sequence[GivenValue]) -> dict[str, str]:
     """How many of the given values are assumed, and estimated on this flight, for captions."""
-    assumed = sum(one.source.startswith("assumed") for one in said)
-    here = sum(one.source == ROUGH for one in said)
-    return {"values": str(len(said)), "assumed": str(assumed), "here": str(here)}
+    counts = {name: sum(one.source.startswith(source) for one in given)
+              for name, source in (("values", ""), ("assumed", "assumed"), ("here", HERE))}  # fmt: skip
+    return {name: str(count) for name, count in counts.items()}
+
+
+def plain(text: str) -> str:
+    """A name without the signs by which a page sets words bold or as code."""
+    return text.replace("*", "∗").replace("`", "ˋ")
 
 
 # -- the page
@@ -412,8 +411,8 @@ def show_answer(
         names["question" if truth else "question-innovations"], f"targets: {targets}, sensors: {sensors}"
     )
     word = judge_tracks(rows, pairs)
-    said = wording.messages(answer(rows, pairs))
-    report.summary(said, level=word.colour, verdict=(word.value, wording.messages([reason(rows)])[0]))
+    words = wording.messages(answer(rows, pairs))
+    report.summary(words, level=word.colour, verdict=(word.value, wording.messages([reason(rows)])[0]))
     report.metric(VERDICT_LEVEL, "tracking", word.level, "1")
 
 

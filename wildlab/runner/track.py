@@ -13,11 +13,10 @@ from typing import Any, cast
 
 from rich.console import Console
 
-from wildlab.analysis.tracks.inputs import sensors_with_detections
 from wildlab.analysis.tracks.many import refuse_unfit as refuse_unfit_settings
 from wildlab.analysis.tracks.noise_model import Against, settings_of
 from wildlab.analysis.tracks.scans import sensors_of
-from wildlab.analysis.tracks.tracker import refuse_unusable
+from wildlab.analysis.tracks.tracker import refuse_unusable, sensors_with_detections
 from wildlab.analysis.tracks.tuning import refuse_same, tune_flight, tuned_text
 from wildlab.errors import WildlabError
 from wildlab.flight.files import dump_toml
@@ -94,8 +93,8 @@ def track_flight(
     stated = None if settings is None else read_settings(settings)
     if against is not None and tune is None:
         raise WildlabError(
-            "it says against what to tune, and not on which flight",
-            "name another flight with --tune, or leave --against out",
+            "it is not said on which flight to tune",
+            "add --tune, or leave --against out",
             field="--against",
         )
     refuse_unusable(flight, stated, filters, targets, sensors, source)
@@ -108,7 +107,7 @@ def track_flight(
         if missing := [name for name in wanted if name not in there]:
             raise WildlabError(
                 f"the flight {other.name!r} has no detections of the sensor {missing[0]!r}",
-                "tune on a flight with the same sensors, or name with --sensor those that both have",
+                "name the sensors of both with --sensor",
                 file=tune,
                 field="--tune",
             )

@@ -17,8 +17,13 @@ import pandas as pd
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.analysis.tracks.inputs import SensorInputs
-from wildlab.analysis.tracks.noise_model import SensorTuning, TargetModel, model_targets, noise_of_tuning
+from wildlab.analysis.tracks.noise_model import (
+    SensorInputs,
+    SensorTuning,
+    TargetModel,
+    model_targets,
+    noise_of_tuning,
+)
 from wildlab.analysis.tracks.scans import scans_of, sensors_of, truths_at
 from wildlab.analysis.tracks.scores import score_track, seen_of
 from wildlab.analysis.tracks.single_target import SensorTrack, track_target

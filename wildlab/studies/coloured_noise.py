@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wildlab.analysis.tracks.sighting import CvTuning, Sighting, evaluate_track, follow_positions
+from wildlab.analysis.tracks.pixels import CvTuning, PixelMeasurements, evaluate_track, track_positions
 from wildlab.errors import WildlabError
 from wildlab.studies.linear_vs_nonlinear import (
     OBSERVER,
@@ -95,51 +95,51 @@ def tuning_of(twin: str) -> FilterTunings:
     return TUNINGS[twin]
 
 
-def track_by_singer(seen: Sighting, tuning: FilterTunings) -> Track:
+def track_by_singer(seen: PixelMeasurements, tuning: FilterTunings) -> Track:
     """Filter 2: Singer's motion, over the detections alone.
 
     The model is continuous in time, so that the frames in between change nothing.
     """
     motion = partial(singer, alpha=tuning.singer.alpha, variance=tuning.singer.variance)
     begin = start_on_detections(seen, tuning.cv, 6, sd_acceleration=tuning.singer.acceleration_0)
-    rows = seen.seen
+    rows = seen.detected
     return run_filter(
         seen.times[rows], seen.positions[rows], np.eye(2) * tuning.cv.measurement**2, positions(),
         remembered(motion), begin, output_times=seen.times,
     )  # fmt: skip
 
 
-def track_by_differences(seen: Sighting, tuning: FilterTunings) -> Track:
+def track_by_differences(seen: PixelMeasurements, tuning: FilterTunings) -> Track:
     """Filter 3: differences of measurements a second apart at most, H (7.7)-(7.12); over detections alone."""
-    rows = seen.seen
+    rows = seen.detected
     return run_coloured(
         seen.times[rows], seen.positions[rows], np.eye(2) * tuning.cv.measurement**2,
         as_in_frames(seen, tuning.cv.motion), start_on_detections(seen, tuning.cv), output_times=seen.times,
     )  # fmt: skip
 
 
-def track_target(seen: Sighting, tuning: FilterTunings) -> dict[str, ScoredTrack]:
+def track_target(seen: PixelMeasurements, tuning: FilterTunings) -> dict[str, ScoredTrack]:
     """A sighting through the three filters."""
     tracks = {
-        "cv": follow_positions(seen, tuning.cv),
+        "cv": track_positions(seen, tuning.cv),
         "singer": track_by_singer(seen, tuning),
         "coloured": track_by_differences(seen, tuning),
     }
     return {subject: ScoredTrack(one, evaluate_track(seen, one)) for subject, one in tracks.items()}
 
 
-def track_varied(seen: Sighting, tuning: FilterTunings) -> dict[str, ScoredTrack]:
+def track_varied(seen: PixelMeasurements, tuning: FilterTunings) -> dict[str, ScoredTrack]:
     """The variations of `VARIED`."""
     less = tuning.cv._replace(measurement=LESS_NOISE * tuning.cv.measurement)
     more = tuning.cv._replace(acceleration=MORE_ACCELERATION * tuning.cv.acceleration)
-    tracks = (track_by_differences(seen, tuning._replace(cv=less)), follow_positions(seen, more))
+    tracks = (track_by_differences(seen, tuning._replace(cv=less)), track_positions(seen, more))
     return {
         subject: ScoredTrack(track, evaluate_track(seen, track))
         for subject, track in zip(VARIED, tracks, strict=True)
     }
 
 
-def beginnings(seen: Sighting, tracks: dict[str, ScoredTrack]) -> Numbers:
+def beginnings(seen: PixelMeasurements, tracks: dict[str, ScoredTrack]) -> Numbers:
     """RMS error of the speed (m/s) within `BEGINNING_S` of the first frame, by filter."""
     rows = seen.times - seen.times[0] <= BEGINNING_S
     speed = np.hypot(*seen.truth[rows, 2:].T)

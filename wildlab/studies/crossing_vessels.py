@@ -1,18 +1,29 @@
-"""Two vessels that cross, as one flight saw them: detections on the sea, and where the two were."""
+"""Two vessels that cross, as one flight saw them: detections on the sea, and where the two were.
+
+A bank of Kalman filters on positions with firm association: the tracking system of H 3.3, 3.4 and 6.4.4.
+
+What targets look like helps, H 3.3.1 and 6.4.4: a track keeps what its target looked like at its start. H
+names size, intensity and the first of Hu's invariants, and prints neither weights nor spreads: both are the
+caller's to choose.
+
+A track starts on detections in two consecutive images that lie near each other (H 6.2.4, 6.4.4) and in no
+gate that has room for them (H 3.3). None ends.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from wildlab.analysis.georeference import observe
 from wildlab.analysis.rendered import Photographer, exposures_of
-from wildlab.analysis.tracks.sighting import truth_states
+from wildlab.analysis.tracks.pixels import truth_states
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import Flight
 from wildlab.geometry.covariances import gate_threshold
@@ -23,10 +34,310 @@ from wildlab.reporting.charts.forms import draw_picture, spread_points
 from wildlab.reporting.figures import BLUE, INK, ORANGE, VERMILLION, map_axes, new_figure
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.twins import simulate_twin
-from wildlab.tracking.association import Appearance, image_features
-from wildlab.tracking.many.bank import Bank, Looks, Tuning, run_bank
+from wildlab.tracking.association import (
+    Assignment,
+    global_nearest,
+    innovation_squared,
+)
+from wildlab.tracking.kalman import predict, update
+from wildlab.tracking.motion import constant_velocity, in_steps
 
 Index = NDArray[np.int64]
+
+# -- the tracking system
+
+_H = np.eye(2, 4)
+
+
+def image_features(area: ArrayLike, intensity: ArrayLike, hu: ArrayLike, metres_per_px: ArrayLike) -> Array:
+    """Size, intensity and first Hu moment of detections, on scales whose spread hardly depends on the value.
+
+    Size is taken on the ground, so that it stays the same while the distance changes.
+
+    Parameters
+    ----------
+    area
+        (N,) px^2.
+    intensity
+        (N,) mean of each region less the background's, in any unit.
+    hu
+        (N, 7) or (N,), of which the first invariant counts.
+    metres_per_px
+        (N,) or one: how long a pixel is at the target, m.
+
+    Returns
+    -------
+    (N, 3)
+        Natural logarithm of the size in m^2, intensity, natural logarithm of the Hu moment; NaN where a size
+        or a moment is not positive.
+
+    Examples
+    --------
+    >>> image_features([100.0], [12.0], [0.2], 0.5).round(2).tolist()
+    [[3.22, 12.0, -1.61]]
+    """
+    first = np.asarray(hu, float)
+    first = first[:, 0] if first.ndim == 2 else first
+    size = np.asarray(area, float) * np.asarray(metres_per_px, float) ** 2
+    columns = (
+        np.log(np.where(size > 0, size, np.nan)),
+        np.asarray(intensity, float),
+        np.log(np.where(first > 0, first, np.nan)),
+    )
+    return np.stack(np.broadcast_arrays(*columns), axis=-1)
+
+
+def feature_distances(measured: ArrayLike, stored: ArrayLike, sd: ArrayLike, weights: ArrayLike) -> Array:
+    """Weighted sum of squared differences of features, each in units of its spread.
+
+    With all weights 1 and features that are normal and independent it is chi-square, as (3.9) is, so that the
+    two may be added.
+
+    Parameters
+    ----------
+    measured
+        (N, f) of measurements.
+    stored
+        (M, f) of tracks.
+    sd
+        (f,) standard deviation of the difference between a measurement of a target and what its track keeps.
+    weights
+        (f,), not negative; zero leaves a feature out.
+
+    Returns
+    -------
+    (N, M)
+        A feature that is not known, NaN, on either side adds nothing.
+
+    Examples
+    --------
+    >>> feature_distances([[3.0, 1.0]], [[1.0, 1.0], [3.0, 4.0]], sd=[1.0, 3.0], weights=[1.0, 0.5]).tolist()
+    [[4.0, 0.5]]
+    """
+    new, kept, spread, w = (np.asarray(one, float) for one in (measured, stored, sd, weights))
+    apart = (new[:, None] - kept) / spread
+    return np.asarray(np.where(np.isnan(apart), 0.0, w * apart**2).sum(axis=-1))
+
+
+class Appearance(NamedTuple):
+    """What detections look like, (D, f), with spreads and weights, (f,)."""
+
+    features: Array
+    sd: Array
+    weights: Array
+
+
+class Known(NamedTuple):
+    """What is known of T tracks, by their numbers.
+
+    Attributes
+    ----------
+    x, P
+        (T, 4) and (T, 4, 4) state.
+    stored
+        (T, f) means of the features of the two first detections.
+    """
+
+    x: Array
+    P: Array
+    stored: Array
+
+
+def nobody(f: int) -> Known:
+    """No track, with so many features."""
+    return Known(np.empty((0, 4)), np.empty((0, 4, 4)), np.empty((0, f)))
+
+
+def pair_scans(
+    waiting: ArrayLike, arrived: ArrayLike, dt: float, R: ArrayLike, max_speed: float, gate: float
+) -> Assignment:
+    """Which detection of a scan continues which one of the scan before: steps 1 and 2 of H 3.4.1.
+
+    The validation region is that of the noise of both, about all places that the target may have come to:
+    what lies in between counts only where it is more than the target can have moved. Where several lie in
+    one region, those are paired whose distances, all counted, have the least sum.
+
+    Parameters
+    ----------
+    waiting, arrived
+        (M, 2) and (N, 2) positions of the scan before and of this one, m.
+    dt
+        Time between the two, s, not negative.
+    R
+        (2, 2) covariance of the noise of a position, m^2.
+    max_speed
+        Largest speed of a target, m/s.
+    gate
+        On the square of the distance in units of its spread, as of (3.9).
+
+    Returns
+    -------
+    Assignment
+        The waiting detections stand for its tracks.
+
+    Examples
+    --------
+    >>> pair_scans([[0.0, 0.0]], [[90.0, 0.0], [4.0, 3.0]], 1.0, np.eye(2), max_speed=5.0, gate=9.21)
+    Assignment(track=array([-1,  0]), measurement=array([1]))
+    """
+    old, new = (np.asarray(points, float).reshape(-1, 2) for points in (waiting, arrived))
+    gap = new[:, None] - old
+    distance = innovation_squared(gap, 2 * np.asarray(R, float)) if gap.size else np.zeros(gap.shape[:2])
+    length = np.linalg.norm(gap, axis=-1)
+    beyond = np.maximum(length - max_speed * dt, 0.0) / np.where(length > 0, length, 1.0)
+    return global_nearest(np.where(beyond**2 * distance <= gate, distance, np.inf), np.inf)
+
+
+class Tuning(NamedTuple):
+    """What the tracking system is given; standard deviations are per axis.
+
+    Attributes
+    ----------
+    measurement
+        m: of a measurement, and of the first position.
+    acceleration
+        m/s^2, of the process noise of constant velocity, H (6.2), held from image to image.
+    velocity_0
+        m/s, of the first velocity.
+    gate
+        On the normalised innovation squared, H (3.9).
+    max_speed
+        m/s: of a target from the first detection of a track to its second.
+    """
+
+    measurement: float
+    acceleration: float
+    velocity_0: float
+    gate: float
+    max_speed: float
+
+
+class ImageDetections(NamedTuple):
+    """Images with detections, in order of time; D detections in all, image after image.
+
+    Attributes
+    ----------
+    image
+        (D,) number of the image of each, of the camera's.
+    positions
+        (D, 2) on the sea, m.
+    interval
+        Between two images, s.
+    """
+
+    image: Index
+    positions: Array
+    interval: float
+
+
+class Bank(NamedTuple):
+    """What the tracking system made of it.
+
+    Attributes
+    ----------
+    track
+        (D,) the track that each detection went to, -1 where it went to none.
+    started
+        (T,) the detection that each track started with.
+    images
+        (K,) numbers of the images with detections.
+    x, P
+        (K, T, 4) and (K, T, 4, 4) states after each image; NaN before a track has started.
+    """
+
+    track: Index
+    started: Index
+    images: Index
+    x: Array
+    P: Array
+
+
+def run_bank(detections: ImageDetections, tuning: Tuning, appearance: Appearance | None = None) -> Bank:
+    """Track everything that was detected.
+
+    Parameters
+    ----------
+    detections
+        What was detected.
+    tuning
+        Of the system.
+    appearance
+        What the detections look like, to be weighed in; by distance alone where it is left out.
+
+    Returns
+    -------
+    Bank
+        Tracks and their states.
+    """
+
+    @cache
+    def motion(images: int) -> tuple[Array, Array]:
+        """Noise is held over the time between two images, as often as H predicted (6.2)."""
+        held = partial(constant_velocity, sd_acceleration=tuning.acceleration)
+        return in_steps(images * detections.interval, held, 1.001 * detections.interval)
+
+    R = tuning.measurement**2 * np.eye(2)
+    track = np.full(len(detections.image), -1)
+    features = np.empty((len(track), 0)) if appearance is None else appearance.features
+    tracks = nobody(features.shape[1])
+    images, firsts = np.unique(detections.image, return_index=True)
+    started, states = list[int](), list[Known]()
+    waiting, before = np.empty(0, int), 0
+    for image, rows in zip(images.tolist(), np.split(np.arange(len(track)), firsts[1:]), strict=True):
+        z = detections.positions[rows]
+        free = np.ones(len(rows), bool)
+        if started:
+            x, P = predict(tracks.x, tracks.P, *motion(image - before))
+            gap = z[:, None] - x[:, :2]
+            distances = innovation_squared(gap, np.broadcast_to(P[:, :2, :2] + R, (*gap.shape, 2)))
+            if appearance is None:
+                chosen = global_nearest(distances, tuning.gate)
+            else:
+                # What is stored is the mean of two, and as uncertain as half of a detection.
+                sd = np.sqrt(1.5) * appearance.sd
+                seen = feature_distances(features[rows], tracks.stored, sd, appearance.weights)
+                # The gate is one of the distance alone (H 6.4.4).
+                chosen = global_nearest(np.where(distances <= tuning.gate, distances + seen, np.inf), np.inf)
+            one = np.flatnonzero(chosen.track >= 0)
+            to = chosen.track[one]
+            done = update(x[to], P[to], z[one], _H, R)
+            x[to], P[to], track[rows[one]] = done.x, done.P, to
+            tracks = Known(x, P, tracks.stored)
+            free = chosen.track < 0
+        new = rows[free]
+        if len(waiting) and image - before == 1 and len(new):
+            old, z = detections.positions[waiting], detections.positions[new]
+            pairs = pair_scans(old, z, detections.interval, R, tuning.max_speed, tuning.gate)
+            for first, at in zip(waiting, pairs.measurement, strict=True):
+                if at < 0:
+                    continue
+                two = np.array([first, new[at]])
+                track[two] = len(started)
+                started.append(int(first))
+                fresh = _start(detections.positions[two], features[two], tuning, motion(1))
+                tracks = Known._make(map(np.append, tracks, fresh, [0] * len(fresh)))
+            new = new[pairs.track < 0]
+        waiting, before = new, image
+        states.append(tracks)
+    xs = np.full((len(states), len(started), 4), np.nan)
+    Ps = np.full((*xs.shape, 4), np.nan)
+    for k, then in enumerate(states):
+        xs[k, : len(then.x)], Ps[k, : len(then.x)] = then.x, then.P
+    return Bank(track, np.array(started, int), images, xs, Ps)
+
+
+def _start(z: Array, features: Array, tuning: Tuning, step: tuple[Array, Array]) -> Known:
+    """On the first of two positions with zero speed (H 6.2.4), updated with the second."""
+    x = np.concatenate([z[0], np.zeros(2)])
+    P = np.diag([tuning.measurement**2] * 2 + [tuning.velocity_0**2] * 2)
+    x, P = predict(x, P, *step)
+    done = update(x, P, z[1], _H, tuning.measurement**2 * np.eye(2))
+    parts = done.x, done.P, features.mean(axis=0)
+    return Known._make(part[None] for part in parts)
+
+
+# -- what one flight saw
+
 #: Numbers of a flight by (subject, name).
 Numbers = dict[tuple[str, str], float]
 
@@ -47,8 +358,8 @@ class Crossing(NamedTuple):
 
     Attributes
     ----------
-    looks
-        All detections.
+    detections
+        All of them.
     boat
         (D,) 0 or 1: whose each is, as by manual classification.
     times
@@ -57,7 +368,7 @@ class Crossing(NamedTuple):
         (2, K, 2) where the two were by their own receivers, m.
     """
 
-    looks: Looks
+    detections: ImageDetections
     boat: Index
     times: Array
     truth: Array
@@ -79,9 +390,9 @@ def gather(flight: Flight) -> Crossing:
     order = np.lexsort((boat, number))
     order = order[np.isfinite(positions[order]).all(axis=1)]
     times = np.array([at[int(one)] for one in np.unique(number[order])])
-    looks = Looks(number[order], positions[order], float(np.median(np.diff(stamps))))
+    detected = ImageDetections(number[order], positions[order], float(np.median(np.diff(stamps))))
     truth = np.stack([truth_states(flight, name, times)[:, :2] for name in BOATS])
-    return Crossing(looks, boat[order], times, truth)
+    return Crossing(detected, boat[order], times, truth)
 
 
 def apart_times(crossing: Crossing) -> tuple[float, float]:
@@ -160,7 +471,7 @@ def swapped(crossing: Crossing, bank: Bank) -> tuple[bool, bool]:
     That is, of each more than half of its detections in `WINDOW_S` went to a track of the other; a vessel
     without detections then has no track of the other.
     """
-    at = np.searchsorted(bank.images, crossing.looks.image)
+    at = np.searchsorted(bank.images, crossing.detections.image)
     _, from_s = apart_times(crossing)
     wrong, when = wrong_of(crossing, bank), crossing.times[at]
 
@@ -246,7 +557,7 @@ def fly(seed: int, twin: str, images: int, flight: Flight | None = None) -> Flow
 
 def track(crossing: Crossing, appearance: Appearance | None = None) -> Bank:
     """All detections, tracked with the published tuning; by distance alone without an appearance."""
-    return run_bank(crossing.looks, TUNING, appearance)
+    return run_bank(crossing.detections, TUNING, appearance)
 
 
 def all_numbers(flown: Flown) -> Numbers:
@@ -323,7 +634,7 @@ def plot_features(looks: list[Array]) -> Figure:
 def plot_frame(flown: Flown, twin: str, seed: int) -> Figure:
     """A rendered frame in which both are detected, about `APART_M` apart, with what the detector finds."""
     crossing = flown.crossing
-    images, detections = np.unique(crossing.looks.image, return_counts=True)
+    images, detections = np.unique(crossing.detections.image, return_counts=True)
     both = np.flatnonzero(detections == len(BOATS))
     row = both[np.nanargmin(np.abs(crossing.apart[both] - APART_M))]
     camera = Photographer(twin, seed)

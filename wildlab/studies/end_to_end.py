@@ -14,7 +14,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from wildlab.analysis.rendered import Marks, Photographer, exposures_of, marks_of, with_detections
-from wildlab.analysis.tracks.sighting import Sighting, sighting
+from wildlab.analysis.tracks.pixels import PixelMeasurements, read_pixels
 from wildlab.errors import WildlabError
 from wildlab.evaluation.intervals import mean_interval, mean_share_interval
 from wildlab.evaluation.shares import Check, Decision, decide
@@ -72,7 +72,7 @@ class FlightPair(NamedTuple):
     """
 
     flights: Mapping[str, Flight]
-    seen: Mapping[str, Sighting]
+    seen: Mapping[str, PixelMeasurements]
     marks: Marks
     camera: Photographer
     drawn_uv: Array
@@ -122,7 +122,7 @@ def fly(twin: str, seed: int, every: int = 1) -> FlightPair:
     flights = {DRAWN: flight, RENDERED: other}
     return FlightPair(
         flights,
-        {kind: sighting(one, source) for kind, one in flights.items()},
+        {kind: read_pixels(one, source) for kind, one in flights.items()},
         marks,
         camera,
         drawn[["u_px", "v_px"]].to_numpy(float),
@@ -178,7 +178,7 @@ def detection_numbers(pair: FlightPair, twin: str, seed: int) -> Numbers:
     }
 
 
-def track_numbers(seen: Sighting, twin: str) -> Numbers:
+def track_numbers(seen: PixelMeasurements, twin: str) -> Numbers:
     """What the cases that are about a twin's flight compute of a sighting, by (subject, name)."""
     result: Numbers = {}
     if twin in filters.CASES:

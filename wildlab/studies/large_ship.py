@@ -22,7 +22,7 @@ from wildlab.analysis.rendered import (
     marks_of,
     with_detections,
 )
-from wildlab.analysis.tracks.sighting import CvTuning, Sighting, follow_pixels, sighting
+from wildlab.analysis.tracks.pixels import CvTuning, PixelMeasurements, read_pixels, track_pixels
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import georeference_pixels
@@ -101,7 +101,7 @@ class Tracked(NamedTuple):
         Of the extended Kalman filter on pixels, H 6.3.
     """
 
-    seen: Sighting
+    seen: PixelMeasurements
     marks: Marks
     track: Track
 
@@ -154,14 +154,14 @@ def track_marks(taken: Photographs, marks: Marks) -> Tracked:
     """Put detections on the sea with the autopilot's poses, and track them in the image, H 6.3."""
     target = str(taken.flight.table("detections")["target_id"].iloc[0])
     flight = with_detections(taken.flight, marks, target)
-    seen = sighting(flight, SOURCE)
+    seen = read_pixels(flight, SOURCE)
     # A sighting begins and ends with a detection.
     rows = np.flatnonzero(marks.found)
     inside = slice(int(rows[0]), int(rows[-1]) + 1)
     groups = flight.table("frames")["group"].to_numpy(object)[inside]
     seen = seen._replace(times=merged_times(seen.times, groups))
     within = marks.take(inside)
-    return Tracked(seen, within, follow_pixels(seen, TUNING))
+    return Tracked(seen, within, track_pixels(seen, TUNING))
 
 
 def errors_of(one: Tracked) -> tuple[Array, Array]:
@@ -192,7 +192,7 @@ def time_to_rest(times: Array, speed: Array) -> float:
 def numbers_of_track(taken: Photographs, one: Tracked) -> dict[str, float]:
     """What the detections on the sea and their track are worth, by the names of `UNITS`."""
     measured, estimated = errors_of(one)
-    known, marks, times = one.seen.seen, one.marks, one.seen.times
+    known, marks, times = one.seen.detected, one.marks, one.seen.times
     positions, distance = one.seen.positions[known], np.hypot(*estimated.T)
     speed, later = np.hypot(*one.track.x[:, 2:4].T), times >= START_S
     exact = taken.camera.flight.poses.take(marks.exposure)
@@ -287,7 +287,7 @@ def images(taken: Photographs) -> Figure:
 def positions(tracked: Mapping[str, Tracked], names: Mapping[str, str]) -> Figure:
     """Georeferenced positions about the ship's receiver, with and without (H figure 6.3)."""
     fig, axes = new_figure(5.9, 3.7, columns=2)
-    errors = {who: -errors_of(one)[0][one.seen.seen] for who, one in tracked.items()}
+    errors = {who: -errors_of(one)[0][one.seen.detected] for who, one in tracked.items()}
     reach = 1.08 * max(float(np.abs(e).max()) for e in errors.values())
     for ax, (who, e) in zip(axes, errors.items(), strict=True):
         draw_errors(ax, e, _COLOURS[who], names[who].capitalize(), reach)

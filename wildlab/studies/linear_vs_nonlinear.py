@@ -12,16 +12,16 @@ from typing import NamedTuple
 import numpy as np
 
 from wildlab.analysis.navigate import navigate_observer
-from wildlab.analysis.tracks.sighting import (
+from wildlab.analysis.tracks.pixels import (
     CvTuning,
+    PixelMeasurements,
     Scored,
-    Sighting,
     evaluate_measurements,
     evaluate_track,
-    follow_pixels,
-    follow_positions,
-    sighting,
+    read_pixels,
     start,
+    track_pixels,
+    track_positions,
 )
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
@@ -74,17 +74,17 @@ def case_of(twin: str) -> Case:
     return CASES[twin]
 
 
-def fly_sighting(twin: str, seed: int, source: str) -> tuple[Flight, Sighting]:
+def fly_sighting(twin: str, seed: int, source: str) -> tuple[Flight, PixelMeasurements]:
     """A simulated flight and what its camera saw, with the poses of the observer or of the autopilot."""
     flight = simulate_twin(twin, seed, () if source == OBSERVER else ("imu", "gnss"))
     return flight, sight(flight, source)
 
 
-def sight(flight: Flight, source: str) -> Sighting:
+def sight(flight: Flight, source: str) -> PixelMeasurements:
     """What the camera of a flight saw; the observer's poses are computed where they are asked for."""
     if source == OBSERVER and OBSERVER not in flight.nav:
         flight.nav[OBSERVER] = navigate_observer(flight).nav
-    return sighting(flight, source)
+    return read_pixels(flight, source)
 
 
 def remembered(motion: Motion) -> Motion:
@@ -96,7 +96,7 @@ def remembered(motion: Motion) -> Motion:
     return lambda dt: kept(round(dt, 6))
 
 
-def as_in_frames(seen: Sighting, motion: Motion) -> Motion:
+def as_in_frames(seen: PixelMeasurements, motion: Motion) -> Motion:
     """A motion model that gives after a pause what it would have given predicting at every frame.
 
     H (6.2) holds its noise over a step, and the thesis predicted as often as the camera took pictures.
@@ -105,26 +105,26 @@ def as_in_frames(seen: Sighting, motion: Motion) -> Motion:
     return remembered(partial(in_steps, motion=motion, longest=1.001 * float(np.median(np.diff(seen.times)))))
 
 
-def start_on_detections(seen: Sighting, tuning: CvTuning, n: int = 4, **more: float) -> Start:
-    """As `wildlab.analysis.tracks.sighting.start`, its row counted among the detections alone."""
-    rows = np.flatnonzero(seen.seen)
+def start_on_detections(seen: PixelMeasurements, tuning: CvTuning, n: int = 4, **more: float) -> Start:
+    """As `wildlab.analysis.tracks.pixels.start`, its row counted among the detections alone."""
+    rows = np.flatnonzero(seen.detected)
     begin = start(seen, tuning, n, **more)
     return begin._replace(row=int(np.searchsorted(rows, begin.row)))
 
 
-def track_target(seen: Sighting, tuning: CvTuning) -> dict[str, ScoredTrack]:
+def track_target(seen: PixelMeasurements, tuning: CvTuning) -> dict[str, ScoredTrack]:
     """A sighting through both filters."""
-    tracks = {"kf": follow_positions(seen, tuning), "ekf": follow_pixels(seen, tuning)}
+    tracks = {"kf": track_positions(seen, tuning), "ekf": track_pixels(seen, tuning)}
     return {who: ScoredTrack(one, evaluate_track(seen, one, AXES[who])) for who, one in tracks.items()}
 
 
-def numbers_of(seen: Sighting, tracks: dict[str, ScoredTrack]) -> Numbers:
+def numbers_of(seen: PixelMeasurements, tracks: dict[str, ScoredTrack]) -> Numbers:
     """What is compared over flights: the numbers of `evaluate_track` by filter.
 
     The subject ``measurements`` has those of `evaluate_measurements`, and ``detections``, how many there are.
     """
     result = {(who, name): value for who, one in tracks.items() for name, value in one.scored.numbers.items()}
-    measured = {**evaluate_measurements(seen), "detections": seen.seen.sum()}
+    measured = {**evaluate_measurements(seen), "detections": seen.detected.sum()}
     return result | {("measurements", name): value for name, value in measured.items()}
 
 

@@ -28,15 +28,15 @@ from wildlab.analysis.pose_noise import (
     premise_numbers,
     shown,
 )
-from wildlab.analysis.tracks.sighting import (
+from wildlab.analysis.tracks.pixels import (
     CvTuning,
+    PixelMeasurements,
     Scored,
-    Sighting,
     evaluate_track,
-    follow_pixels,
-    follow_schmidt,
-    sighting,
+    read_pixels,
     start,
+    track_pixels,
+    track_schmidt,
 )
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import Average, average, chi_square_interval, position_nees, share_inside
@@ -59,8 +59,8 @@ from wildlab.reporting.published import bounds_of
 from wildlab.simulation.twins import simulate_twin
 from wildlab.studies.page import Shown
 from wildlab.tracking.batch import BatchCamera, run_batch
+from wildlab.tracking.kalman import Considered
 from wildlab.tracking.run import Track
-from wildlab.tracking.schmidt import Considered
 from wildlab.tracking.sensors import POSE
 
 Numbers = dict[tuple[str, str], float]
@@ -124,23 +124,23 @@ MORE_NAMES = (
 class Compared(NamedTuple):
     """A sighting, each subject's track on it, scored, and numbers of the poses and of the flight."""
 
-    seen: Sighting
+    seen: PixelMeasurements
     tracks: dict[str, Track]
     scored: dict[str, Scored]
     beside: Numbers
 
 
-def navigated_sighting(flight: Flight) -> Sighting:
+def navigated_sighting(flight: Flight) -> PixelMeasurements:
     """What the camera saw, with the poses of an MEKF whose mean deviations are those that H prints."""
     flight.nav[SOURCE] = navigate_mekf(flight, tuning=PUBLISHED_LIKE).nav
-    return sighting(flight, SOURCE)
+    return read_pixels(flight, SOURCE)
 
 
-def sheet_sighting(flight: Flight) -> Sighting:
+def sheet_sighting(flight: Flight) -> PixelMeasurements:
     """What the camera saw, with the poses of the MEKF that is given all that the data sheets state: noise,
     biases, axes, and GNSS errors that wander."""
     flight.nav[SHEET] = navigate_mekf(flight).nav
-    return sighting(flight, SHEET)
+    return read_pixels(flight, SHEET)
 
 
 def constant_covariance(degrees: float, metres: float = 0.0) -> Array:
@@ -165,7 +165,7 @@ def only(covariance: ArrayLike, attitude: bool) -> Array:
     return P
 
 
-def compare(seen: Sighting, by_sheet: Sighting, noise: PoseNoise) -> dict[str, Track]:
+def compare(seen: PixelMeasurements, by_sheet: PixelMeasurements, noise: PoseNoise) -> dict[str, Track]:
     """All of `SUBJECTS` on the same detections; but for ``schmidt-data-sheet`` on the same poses.
 
     Parameters
@@ -192,15 +192,15 @@ def compare(seen: Sighting, by_sheet: Sighting, noise: PoseNoise) -> dict[str, T
     fixed["schmidt-estimated"] = covariance_of(noise)
     told |= {who: np.tile(one, (len(P), 1, 1)) for who, one in fixed.items()}
     tracks = dict(zip(told, _follow_each(seen, list(told.values())), strict=True)) | {
-        "ekf": follow_pixels(seen, TUNING),
-        "ekf-60-pixels": follow_pixels(seen, MORE_NOISE),
-        "schmidt-data-sheet": follow_schmidt(by_sheet, TUNING),
+        "ekf": track_pixels(seen, TUNING),
+        "ekf-60-pixels": track_pixels(seen, MORE_NOISE),
+        "schmidt-data-sheet": track_schmidt(by_sheet, TUNING),
     }
     return {who: tracks[who] for who in SUBJECTS}
 
 
-def _follow_each(seen: Sighting, covariances: list[Array]) -> list[Track]:
-    """`follow_schmidt` with each of several covariances (N, 6, 6), in one run of the compiled filter."""
+def _follow_each(seen: PixelMeasurements, covariances: list[Array]) -> list[Track]:
+    """`track_schmidt` with each of several covariances (N, 6, 6), in one run of the compiled filter."""
     z = np.broadcast_to(seen.uv, (len(covariances), *seen.uv.shape))
     return run_batch(
         seen.times,
@@ -250,7 +250,7 @@ def compare_flight(flight: Flight, seed: int) -> Compared:
     return Compared(seen, tracks, scored, beside)
 
 
-def evaluate_nees(seen: Sighting, track: Track, moment: float) -> Scored:
+def evaluate_nees(seen: PixelMeasurements, track: Track, moment: float) -> Scored:
     """NEES alone, and the numbers of `NEES_NAMES`; see `evaluate`."""
     values = position_nees(seen.truth - track.x[:, :4], track.P[:, :4, :4])
     known = np.flatnonzero(np.isfinite(values))
@@ -263,7 +263,7 @@ def evaluate_nees(seen: Sighting, track: Track, moment: float) -> Scored:
     return Scored(values, track.nis, numbers)
 
 
-def evaluate(seen: Sighting, track: Track, moment: float = 0.0) -> Scored:
+def evaluate(seen: PixelMeasurements, track: Track, moment: float = 0.0) -> Scored:
     """`evaluate_track` with more numbers; NaN where the flight has no such part.
 
     ``nees_drawn`` is the NEES at one frame, ``moment`` (0 to 1) of the way through those with a truth: one
@@ -483,9 +483,9 @@ def flight_figures(compared: Compared, first: int, names: Mapping[str, str]) -> 
         "NEES (position)": {who: scored[who].nees for who in PUBLISHED},
     }
     figures = {
-        "errors": error_over_time(t, seen.seen, errors, names, ""),
-        "map": track_map(seen.truth, states, names, "", measured=seen.positions[seen.seen]),
-        "speed": speed_and_course(t, seen.seen, seen.truth, states, names, ""),
-        "squares": squares_over_time(t, seen.seen, squares, names, ""),
+        "errors": error_over_time(t, seen.detected, errors, names, ""),
+        "map": track_map(seen.truth, states, names, "", measured=seen.positions[seen.detected]),
+        "speed": speed_and_course(t, seen.detected, seen.truth, states, names, ""),
+        "squares": squares_over_time(t, seen.detected, squares, names, ""),
     }
     return [Shown(fig, text, f"fig-7-{n}") for n, (text, fig) in enumerate(figures.items(), first)]

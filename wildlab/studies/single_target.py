@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from wildlab.analysis.tracks.sighting import Sighting
+from wildlab.analysis.tracks.pixels import PixelMeasurements
 from wildlab.evaluation.consistency import innovation_whiteness
 from wildlab.geometry.frames import Array
 from wildlab.reporting.charts.tracks import (
@@ -60,14 +60,17 @@ def flights_figures(
 
 
 def flight_figures(
-    seen: Sighting, tracks: Mapping[str, ScoredTrack], names: Mapping[str, str], numbers: Mapping[str, str]
+    seen: PixelMeasurements,
+    tracks: Mapping[str, ScoredTrack],
+    names: Mapping[str, str],
+    numbers: Mapping[str, str],
 ) -> list[Shown]:
     """The flight drawn: paths, tracks, errors, speed and course, NEES and NIS.
 
     ``numbers`` has the number of the thesis's figure for ``paths``, ``map``, ``errors``, ``speed`` and
     ``squares``, as ``"6-05"``; the thesis may have none for ``speed``.
     """
-    times, there = seen.times - seen.times[0], seen.seen
+    times, there = seen.times - seen.times[0], seen.detected
     called = {who: names[who] for who in tracks}
     states = {who: one.track.x[:, :4] for who, one in tracks.items()}
     errors = {who: np.hypot(*(seen.truth - x)[:, :2].T) for who, x in states.items()}
@@ -123,10 +126,10 @@ def filters_table(runs: pd.DataFrame, names: Mapping[str, str], filters: Sequenc
     )
 
 
-def _at_frames(seen: Sighting, nis: Array) -> Array:
+def _at_frames(seen: PixelMeasurements, nis: Array) -> Array:
     """(N,) NIS at the frames of a sighting, also of a filter that went over its detections alone."""
     if len(nis) == len(seen.times):
         return nis
     result = np.full(len(seen.times), np.nan)
-    result[seen.seen] = nis
+    result[seen.detected] = nis
     return result

@@ -25,8 +25,8 @@ from wildlab.simulation.twins import simulate_twin
 from wildlab.studies.page import Shown
 from wildlab.studies.static_point import table_numbers
 from wildlab.tracking.batch import run_batch
-from wildlab.tracking.initiation import start_from_first
 from wildlab.tracking.motion import constant_velocity, in_steps
+from wildlab.tracking.run import start_from_first
 
 #: Navigation source behind each column of the tables.
 COLUMNS = {"observer": "observer", "pixhawk-autopilot": "autopilot"}

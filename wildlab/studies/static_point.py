@@ -27,7 +27,9 @@ from wildlab.simulation.onboard_sensors import as_mounted, mounted_imu
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.twins import simulate_twin
 from wildlab.studies.page import Shown
-from wildlab.tracking.kalman import Filtered, filter_at_rest
+from wildlab.tracking.motion import rest
+from wildlab.tracking.run import Start, Track, run_filter
+from wildlab.tracking.sensors import positions
 
 #: The observer's poses, and those of one that was given the inertial samples in the axes of the IMU.
 OBSERVER, UNCALIBRATED = "observer", "observer-uncalibrated"
@@ -86,14 +88,15 @@ def evaluate_columns(flight: Flight, rng: np.random.Generator) -> dict[str, pd.D
     }
 
 
-def filter_errors(scored: pd.DataFrame) -> Filtered:
+def filter_errors(scored: pd.DataFrame) -> Track:
     """The filter for an object at rest on the errors of scored points, in order of time.
 
     A target at rest makes the error of the estimate the estimate of the error: the filter is linear and its
     gains do not depend on where the target is. ``R`` is each point's own ground covariance.
     """
     ordered = scored.sort_values("time_s", kind="stable")
-    return filter_at_rest(errors_of(ordered), covariances_of(ordered))
+    times, errors, R = ordered["time_s"].to_numpy(float), errors_of(ordered), covariances_of(ordered)
+    return run_filter(times, errors, R, positions(), rest, Start(times[0], errors[0], R[0], 0))
 
 
 def table_numbers(subject: str, scored: pd.DataFrame) -> dict[tuple[str, str], float]:

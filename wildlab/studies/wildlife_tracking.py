@@ -18,22 +18,22 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from wildlab.analysis.animals.images import Detector, Images, take_images
-from wildlab.analysis.animals.tracking import (
+from wildlab.analysis.animal_images import Detector, Images, take_images
+from wildlab.analysis.animal_trackers import (
     Aircraft,
-    FollowedAnimals,
-    Follower,
-    Kalman,
+    KalmanTracker,
     Known,
-    Particles,
+    ParticleTracker,
     Patrolled,
+    TrackedAnimals,
+    Tracker,
     Visits,
-    follow,
     found_on_visits,
     next_lap,
     out_of_sight,
     patrol,
     sight_numbers,
+    track_animals,
     turns,
 )
 from wildlab.analysis.plans.coverage import ExecutionErrors, with_errors
@@ -66,9 +66,7 @@ from wildlab.studies import uav_coverage as uav
 from wildlab.studies.monte_carlo import interval_words
 from wildlab.studies.page import Shown
 from wildlab.tracking.motion import Motion
-from wildlab.tracking.particles import Rules, walk_of
-from wildlab.tracking.particles.clouds import Inside
-from wildlab.tracking.particles.steps import Moves
+from wildlab.tracking.particles import Inside, walk_of
 
 #: The platforms; and by what animals are followed.
 GONDOLA, UAV = "gondola", "uav"
@@ -152,7 +150,7 @@ def herds(twin: TwinParameters, fences: list[Array], times: Array, seed: int) ->
 
 
 class Lap(NamedTuple):
-    """One lap: times (T,) s, headings (T,) rad, poses as told, and how long it takes, s."""
+    """One lap: times (T,) s, headings (T,) rad, nominal poses, and how long it takes, s."""
 
     times: Array
     headings: Array
@@ -216,13 +214,13 @@ def draw_world(platform: str, twin_name: str, seed: int) -> World:
         way, errors = uav_way(twin, land, fences, rate), uav.errors_of_execution(twin)
     rows = np.tile(np.arange(len(way.times)), LAPS)
     times = (way.times + way.lap * np.arange(LAPS)[:, None]).ravel()
-    told, headings = way.poses.take(rows), way.headings[rows]
-    true = with_errors(told, headings, errors, 1 / rate, stream(seed, f"execution, {platform}"))
+    nominal, headings = way.poses.take(rows), way.headings[rows]
+    true = with_errors(nominal, headings, errors, 1 / rate, stream(seed, f"execution, {platform}"))
     detector = detector_of(twin)
     truth = herds(twin, fences, times, seed)
     images = take_images(
         land,
-        told,
+        nominal,
         true,
         headings,
         times,
@@ -239,25 +237,26 @@ def draw_world(platform: str, twin_name: str, seed: int) -> World:
     )  # fmt: skip
 
 
-def particles_of(world: World, seed: int, negative: bool) -> Particles:
+def particles_of(world: World, seed: int, negative: bool) -> ParticleTracker:
     """F's particle filter, which knows how animals walk, their fences, and what the camera shows."""
+    return ParticleTracker(
+        world.motion, insides(world.fences), stream(seed, "particles"), particles=PARTICLES,
+        gate_probability=GATE, negative=negative,
+    )  # fmt: skip
 
-    def rules(moves: Moves) -> Rules:
-        return Rules(moves, particles=PARTICLES, gate_probability=GATE, negative=negative)
 
-    return Particles(world.motion, insides(world.fences), stream(seed, "particles"), rules)
-
-
-def follower_of(name: str, world: World, seed: int) -> Follower:
+def tracker_of(name: str, world: World, seed: int) -> Tracker:
     """One of `FILTERS`."""
     if name == KALMAN:
-        return Kalman(world.motion, GATE)
+        return KalmanTracker(world.motion, GATE)
     return particles_of(world, seed, name == NEGATIVE)
 
 
-def run_filter(name: str, world: World, seed: int) -> FollowedAnimals:
+def run_filter(name: str, world: World, seed: int) -> TrackedAnimals:
     """A world followed by one of `FILTERS`."""
-    return follow(world.images, world.land, world.detector, follower_of(name, world, seed), world.motion)
+    return track_animals(
+        world.images, world.land, world.detector, tracker_of(name, world, seed), world.motion
+    )
 
 
 def patrol_times(world: World) -> Array:
@@ -282,7 +281,7 @@ def run_patrol(world: World, herd: Array, seed: int, visits: Visits) -> Patrolle
     )  # fmt: skip
 
 
-def filter_numbers(world: World, followed: FollowedAnimals) -> dict[str, float]:
+def filter_numbers(world: World, followed: TrackedAnimals) -> dict[str, float]:
     """What is compared of a filter, by name."""
     images = world.images
     later = next_lap(followed.found, images.times, world.lap)
@@ -353,7 +352,7 @@ class Runs(NamedTuple):
     """
 
     worlds: dict[str, World]
-    followed: dict[tuple[str, str], FollowedAnimals]
+    followed: dict[tuple[str, str], TrackedAnimals]
     patrolled: dict[str, Patrolled]
 
 
@@ -464,9 +463,9 @@ def processor_ratio(seeds: Iterable[int], second: str) -> Array:
         world = draw_world(UAV, second, seed)
         images, spent = world.images.first(IMAGES), []
         for name in (POSITIVE, KALMAN):
-            follower = follower_of(name, world, seed)
+            tracker = tracker_of(name, world, seed)
             began = process_time()
-            follow(images, world.land, world.detector, follower, world.motion)
+            track_animals(images, world.land, world.detector, tracker, world.motion)
             spent.append(process_time() - began)
         ratios.append(spent[0] / spent[1])
     return np.array(ratios)
@@ -502,7 +501,7 @@ def figures(runs: Runs, table: pd.DataFrame, names: Mapping[str, str]) -> list[S
     return [Shown(fig, name) for name, fig in found.items() if fig is not None]
 
 
-def tracks_map(world: World, followed: FollowedAnimals, share: float) -> Figure:
+def tracks_map(world: World, followed: TrackedAnimals, share: float) -> Figure:
     """Animals, tracks and the path up to a share of the first lap."""
     fig, ax = new_figure(5.9, 5.2)
     times = world.images.times

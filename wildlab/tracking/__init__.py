@@ -12,18 +12,17 @@ Using a UAV and Thermal Imagery, master's thesis, Linköping University 2016.
 - `run_coloured`, `run_unscented`, `run_imm`: differenced measurements, sigma points, several motion models.
 - `run_smoothed`, `smooth`: back over a track, for flights that are over.
 - `consider_all`: errors of poses, clocks and sensors that a filter keeps in mind.
-- `motion`, `sensors`: what the filters are told of target and sensor. `merge`: several sensors into one
+- `motion`, `sensors`: what the filters are given of target and sensor. `merge`: several sensors into one
   track.
-- `start_from_first`, `start_from_position`, `start_from_rays`: where it begins.
-- `kalman`, `schmidt`, `association`: the single steps.
+- `start_from_first`, `start_from_position`: where it begins.
+- `kalman`, `association`: the single steps.
 - `wildlab.tracking.many`: several targets at once; `wildlab.tracking.particles`: particle filters of many
   animals, with what an image did not show.
 """
 
 from wildlab.tracking.batch import BatchCamera, run_batch
-from wildlab.tracking.filters import ModeTrack, run_coloured, run_imm, run_unscented, thin
-from wildlab.tracking.initiation import start_from_first, start_from_position, start_from_rays
-from wildlab.tracking.kalman import filter_at_rest
+from wildlab.tracking.filters import run_coloured, run_imm, run_unscented, thin
+from wildlab.tracking.kalman import Considered, consider_all
 from wildlab.tracking.motion import (
     Motion,
     constant_velocity,
@@ -33,8 +32,7 @@ from wildlab.tracking.motion import (
     singer,
     white_acceleration,
 )
-from wildlab.tracking.run import Start, Track, run_filter
-from wildlab.tracking.schmidt import Considered, consider_all
+from wildlab.tracking.run import Start, Track, run_filter, start_from_first, start_from_position
 from wildlab.tracking.sensors import Merged, Sensor, SensorMeasurements, merge, pixels, positions, renamed
 from wildlab.tracking.smoothing import run_smoothed, smooth
 
@@ -42,7 +40,6 @@ __all__ = [
     "BatchCamera",
     "Considered",
     "Merged",
-    "ModeTrack",
     "Motion",
     "Sensor",
     "SensorMeasurements",
@@ -50,7 +47,6 @@ __all__ = [
     "Track",
     "consider_all",
     "constant_velocity",
-    "filter_at_rest",
     "in_steps",
     "merge",
     "pixels",
@@ -68,7 +64,6 @@ __all__ = [
     "smooth",
     "start_from_first",
     "start_from_position",
-    "start_from_rays",
     "thin",
     "white_acceleration",
 ]

@@ -6,10 +6,6 @@ pairs that are out of the question. Probabilities are over all ways to deal meas
 to at most one target and to each target at most one; its weight is the product of its pairs' weights and of
 those of the targets left without. Targets that compete for no measurement are independent: sums are taken
 cluster by cluster.
-
-What targets look like helps, H 3.3.1 and 6.4.4: a track keeps what its target looked like at its start. H
-names size, intensity and the first of Hu's invariants, and prints neither weights nor spreads: both are the
-caller's to choose.
 """
 
 from __future__ import annotations
@@ -114,11 +110,6 @@ def global_nearest(distances: ArrayLike, gate: float) -> Assignment:
     -------
     Assignment
 
-    Raises
-    ------
-    WildlabError
-        If the distances are no matrix or one is minus infinity, or the gate is NaN or minus infinity.
-
     Examples
     --------
     The nearest of the first track is nearer still to the second:
@@ -126,7 +117,7 @@ def global_nearest(distances: ArrayLike, gate: float) -> Assignment:
     >>> global_nearest([[2.0, 1.0], [5.0, 9.0]], gate=9.21)
     Assignment(track=array([1, 0]), measurement=array([1, 0]))
     """
-    d = _matrix(distances, gate)
+    d = np.asarray(distances, float)
     possible = np.isfinite(d) & (d <= gate)
     track, measurement = np.full(d.shape[0], -1), np.full(d.shape[1], -1)
     if not possible.any():
@@ -140,23 +131,6 @@ def global_nearest(distances: ArrayLike, gate: float) -> Assignment:
     made = possible[rows, columns]
     track[rows[made]], measurement[columns[made]] = columns[made], rows[made]
     return Assignment(track, measurement)
-
-
-def _matrix(distances: ArrayLike, gate: float) -> Array:
-    d = np.asarray(distances, float)
-    if d.ndim != 2:
-        raise WildlabError(
-            f"distances of shape {d.shape} are no matrix",
-            "give (N, M): a row for each measurement and a column for each track",
-            field="distances",
-        )
-    if (d == -np.inf).any() or np.isnan(gate) or gate == -np.inf:
-        raise WildlabError(
-            "a distance or the gate has no size",
-            "give numbers; infinity for a pair that is out of the question, or for no gate",
-            field="gate" if np.isnan(gate) or gate == -np.inf else "distances",
-        )
-    return d
 
 
 #: Clusters with more targets and more measurements than this are summed by belief propagation: the exact sum
@@ -228,8 +202,8 @@ def association_probabilities(weights: ArrayLike, missed: ArrayLike, most: int =
             own = belief_propagation(part, none)
         if not np.isfinite(own).all():
             raise WildlabError(
-                "targets that cannot be missed share too few measurements: there is no way to deal them out",
-                "give every target a weight above zero of being missed",
+                "targets that cannot be missed share too few measurements",
+                "give each a weight of being missed",
             )
         found[targets, 0] = own[:, 0]
         found[np.ix_(targets, 1 + measurements)] = own[:, 1:]
@@ -320,9 +294,7 @@ def belief_propagation(weights: ArrayLike, missed: ArrayLike) -> Array:
     """
     w, w0 = np.asarray(weights, float), np.asarray(missed, float)
     if not (w0 > 0).all():
-        raise WildlabError(
-            "a target in a large cluster cannot be missed", "give it a weight above zero of being missed"
-        )
+        raise WildlabError("a target in a large cluster cannot be missed", "give it a weight of being missed")
     odds = w / w0[:, None]
     free = np.ones_like(odds)  # from each measurement to each target: how free it is
     for _ in range(MOST_ROUNDS):
@@ -335,103 +307,3 @@ def belief_propagation(weights: ArrayLike, missed: ArrayLike) -> Array:
             break
     all_of = np.concatenate([np.ones((len(w), 1)), odds * free], axis=1)
     return np.asarray(all_of / all_of.sum(axis=1, keepdims=True))
-
-
-def image_features(area: ArrayLike, intensity: ArrayLike, hu: ArrayLike, metres_per_px: ArrayLike) -> Array:
-    """Size, intensity and first Hu moment of detections, on scales whose spread hardly depends on the value.
-
-    Size is taken on the ground, so that it stays the same while the distance changes.
-
-    Parameters
-    ----------
-    area
-        (N,) px^2.
-    intensity
-        (N,) mean of each region less the background's, in any unit.
-    hu
-        (N, 7) or (N,), of which the first invariant counts.
-    metres_per_px
-        (N,) or one: how long a pixel is at the target, m.
-
-    Returns
-    -------
-    (N, 3)
-        Natural logarithm of the size in m^2, intensity, natural logarithm of the Hu moment; NaN where a size
-        or a moment is not positive.
-
-    Examples
-    --------
-    >>> image_features([100.0], [12.0], [0.2], 0.5).round(2).tolist()
-    [[3.22, 12.0, -1.61]]
-    """
-    first = np.asarray(hu, float)
-    first = first[:, 0] if first.ndim == 2 else first
-    size = np.asarray(area, float) * np.asarray(metres_per_px, float) ** 2
-    columns = (_logarithm(size), np.asarray(intensity, float), _logarithm(first))
-    return np.stack(np.broadcast_arrays(*columns), axis=-1)
-
-
-def feature_distances(measured: ArrayLike, stored: ArrayLike, sd: ArrayLike, weights: ArrayLike) -> Array:
-    """Weighted sum of squared differences of features, each in units of its spread.
-
-    With all weights 1 and features that are normal and independent it is chi-square, as (3.9) is, so that the
-    two may be added.
-
-    Parameters
-    ----------
-    measured
-        (N, f) of measurements.
-    stored
-        (M, f) of tracks.
-    sd
-        (f,) standard deviation of the difference between a measurement of a target and what its track keeps.
-    weights
-        (f,), not negative; zero leaves a feature out.
-
-    Returns
-    -------
-    (N, M)
-        A feature that is not known, NaN, on either side adds nothing.
-
-    Raises
-    ------
-    WildlabError
-        If the shapes do not fit each other, a spread is not positive or a weight is negative.
-
-    Examples
-    --------
-    >>> feature_distances([[3.0, 1.0]], [[1.0, 1.0], [3.0, 4.0]], sd=[1.0, 3.0], weights=[1.0, 0.5]).tolist()
-    [[4.0, 0.5]]
-    """
-    new, kept, spread, w = (np.asarray(one, float) for one in (measured, stored, sd, weights))
-    f = w.shape[-1]
-    if (
-        new.ndim != 2
-        or kept.ndim != 2
-        or (new.shape[1], kept.shape[1], w.shape, spread.shape) != (f, f, (f,), (f,))
-    ):
-        raise WildlabError(
-            f"features of shapes {new.shape} and {kept.shape} do not go with spreads of shape {spread.shape} "
-            f"and weights of shape {w.shape}",
-            "give (N, f), (M, f), (f,) and (f,)",
-        )
-    if not (np.isfinite(spread) & (spread > 0)).all():
-        raise WildlabError(f"a spread of {spread.tolist()}", "give positive ones", field="sd")
-    if not (np.isfinite(w) & (w >= 0)).all():
-        raise WildlabError(
-            f"weights of {w.tolist()}", "give none below zero; zero leaves a feature out", field="weights"
-        )
-    apart = (new[:, None] - kept) / spread
-    return np.asarray(np.where(np.isnan(apart), 0.0, w * apart**2).sum(axis=-1))
-
-
-def _logarithm(values: Array) -> Array:
-    return np.log(np.where(values > 0, values, np.nan))
-
-
-class Appearance(NamedTuple):
-    """What detections look like, (D, f), and what is told of it: spreads and weights, (f,)."""
-
-    features: Array
-    sd: Array
-    weights: Array

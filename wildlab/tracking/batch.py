@@ -18,10 +18,10 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.compilation import announced, compiled
 from wildlab.geometry.frames import Array
-from wildlab.tracking import schmidt
+from wildlab.tracking import kalman
+from wildlab.tracking.kalman import LARGEST_CORRELATION, Considered
 from wildlab.tracking.motion import Motion
 from wildlab.tracking.run import Start, Track, check_rows, check_start, checked
-from wildlab.tracking.schmidt import LARGEST_CORRELATION, Considered
 from wildlab.tracking.sensors import POSE
 
 Flags = NDArray[np.bool_]
@@ -133,7 +133,7 @@ def run_batch(
 
 
 def _transitions(covariances: Array) -> Array:
-    """(B, N, k, k) `schmidt.transitions_of_pose` of each run's covariances (B, N, k, k).
+    """(B, N, k, k) `kalman.transitions_of_pose` of each run's covariances (B, N, k, k).
 
     Units do not matter to them, so runs whose covariances are in proportion share theirs.
     """
@@ -143,7 +143,7 @@ def _transitions(covariances: Array) -> Array:
     for k, one in enumerate(unit):
         same = (j for j in range(k) if np.allclose(one, unit[j], rtol=1e-12, atol=0, equal_nan=True))
         like = next(same, None)
-        found.append(schmidt.transitions_of_pose(covariances[k]) if like is None else found[like])
+        found.append(kalman.transitions_of_pose(covariances[k]) if like is None else found[like])
     return np.array(found)
 
 
@@ -160,8 +160,8 @@ def _camera_arrays(
         check_rows(np.shape(view.plane_down)[0], n_rows, "view.plane_down")
     if camera.distorts:
         raise WildlabError(
-            "the camera distorts, and the batch filter knows none that does",
-            "take the distortion out of the pixels first, or use run_filter",
+            "the camera distorts",
+            "undistort the pixels, or use run_filter",
             field="camera",
         )
     p_nc, R_nc, R_bc = (
@@ -214,7 +214,7 @@ def filter_runs(
                     v[i], J[i, i] = z[run, row, i] - x[i], 1.0
             if seen:
                 if P_poses is not None and not _is_covariance(joint, L):
-                    C, out_limited[run, row] = schmidt.limit_cross(
+                    C, out_limited[run, row] = kalman.limit_cross(
                         joint[:4, 4:].copy(), joint[:4, :4].copy(), joint[4:, 4:].copy()
                     )
                     joint[:4, 4:] = C
@@ -353,7 +353,7 @@ def _update(
 
 @compiled
 def _is_covariance(joint: Array, L: Array) -> bool:
-    """Whether ``[P C; C' P_pose]`` surely is one, with no correlation that `schmidt.limit_cross` would limit.
+    """Whether ``[P C; C' P_pose]`` surely is one, with no correlation that `kalman.limit_cross` would limit.
 
     By Cholesky's pivots, the errors first; what is near nothing (or NaN) is left to the careful way.
     """

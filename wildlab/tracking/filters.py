@@ -21,15 +21,14 @@ from wildlab.tracking.run import (
     Start,
     State,
     Track,
-    check_rows,
+    check_sensor,
     check_start,
     checked,
-    predict_by_motion,
     record,
     single_detection,
     step_through,
 )
-from wildlab.tracking.sensors import Sensor, angles_at, check_states, difference, on_state
+from wildlab.tracking.sensors import Sensor, angles_at, difference, on_state
 
 
 class Differenced(NamedTuple):
@@ -64,15 +63,14 @@ def run_coloured(
     *,
     F_c: ArrayLike | None = None,
     longest_gap: float = 1.0,
-    gate_probability: float = 1.0,
     output_times: ArrayLike | None = None,
 ) -> Track:
     """Filter on differences of successive positions, H 7.2.2.
 
     The difference to the next measurement updates the estimate at the earlier of the two, over the time
     between them, and only then is the estimate taken to the later one. A measurement that follows the last
-    used one by more than ``longest_gap`` is used directly, with ``R_w`` as white noise. One left out by the
-    gate, or NaN, is passed over: the next is held against the last used one.
+    used one by more than ``longest_gap`` is used directly, with ``R_w`` as white noise. NaN is passed
+    over: the next is held against the last used one.
 
     The innovation, ``S`` and NIS of a row are those of its difference (or of the measurement, after a gap).
 
@@ -93,8 +91,6 @@ def run_coloured(
         it is left out.
     longest_gap
         s, H 7.2.2.
-    gate_probability
-        Probability that the target's own difference is let in, H (3.9), in (0, 1]; 1 is no gate.
     output_times
         (M,) s, in order; the measurements' own when not given.
 
@@ -107,7 +103,7 @@ def run_coloured(
     WildlabError
         As `wildlab.tracking.run.run_filter`; and for several detections in a frame.
     """
-    given = single_detection(checked(times, positions, R_w, gate_probability, output_times))
+    given = single_detection(checked(times, positions, R_w, 1.0, output_times))
     check_start(start)
     H, F_c = np.eye(2, len(start.x)), np.eye(2) if F_c is None else np.asarray(F_c, float)
     last = start.row if start.row >= 0 and np.isfinite(given.z[start.row]).all() else -1
@@ -133,9 +129,7 @@ def run_coloured(
         )
         if best is None:
             return state
-        record(track, row, best.innovation, best.S, best.nis, 0, best.nis <= given.threshold)
-        if not track.used[row]:
-            return state
+        record(track, row, best.innovation, best.S, best.nis, 0, True)
         last = row
         if direct:
             done = correct(prior, spread, best.innovation, H, R)
@@ -145,7 +139,7 @@ def run_coloured(
         left = best.innovation - model.H @ (done.x - x)
         return now, F @ done.x + model.T @ left, P_new
 
-    return step_through(given, start, predict_by_motion(motion), step)
+    return step_through(given, start, motion, step)
 
 
 def thin(times: ArrayLike, interval: float, usable: ArrayLike | None = None) -> NDArray[np.bool_]:
@@ -183,7 +177,6 @@ def run_unscented(
     motion: Motion,
     start: Start,
     *,
-    gate_probability: float = 1.0,
     output_times: ArrayLike | None = None,
 ) -> Track:
     """Unscented Kalman filter, on one detection per row.
@@ -207,8 +200,6 @@ def run_unscented(
         From `wildlab.tracking.motion`, of n states.
     start
         ``x`` (n,) and ``P`` (n, n), which must be positive definite: sigma points need its root.
-    gate_probability
-        Probability that the target's own measurement is let in, H (3.9), in (0, 1]; 1 is no gate.
     output_times
         (M,) s, in order; the measurements' own when not given.
 
@@ -221,18 +212,15 @@ def run_unscented(
     WildlabError
         Naming field and row: shapes that do not fit each other, times missing or out of order, several
         detections in a frame, an ``R`` that is not positive definite, a start that is not finite or whose
-        ``P`` is no covariance, poses of another length than the measurements, a ``gate_probability`` outside
-        (0, 1].
+        ``P`` is no covariance, poses of another length than the measurements.
     numpy.linalg.LinAlgError
         For a covariance that is not positive definite: a start without variance in some direction.
     """
     # Imported here, for it brings scipy.stats along, which takes longer than all else that is imported.
     from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
 
-    given = single_detection(checked(times, measurements, R, gate_probability, output_times, sensor.sizes))
-    check_start(start)
-    check_rows(sensor.rows, len(given.times), "sensor")
-    check_states(sensor, len(start.x))
+    given = single_detection(checked(times, measurements, R, 1.0, output_times, sensor.sizes))
+    check_sensor(sensor, start, len(given.times))
     n, m = len(start.x), given.z.shape[2]
     angles = sensor.angles
     wrapped = any(angles) if sensor.row_angles is None else bool(sensor.row_angles.any())
@@ -264,21 +252,14 @@ def run_unscented(
         points = iter(seen)
         ukf.update(given.z[row, 0], R=given.R[row, 0], hx=lambda x: next(points))
         nis = float(ukf.y @ np.linalg.solve(ukf.S, ukf.y))
-        record(track, row, ukf.y, ukf.S, nis, 0, nis <= given.thresholds[row])
-        return (given.times[row], ukf.x, (ukf.P + ukf.P.T) / 2) if track.used[row] else prior
+        record(track, row, ukf.y, ukf.S, nis, 0, True)
+        return given.times[row], ukf.x, (ukf.P + ukf.P.T) / 2
 
-    return step_through(given, start, predict_by_motion(motion), step)
+    return step_through(given, start, motion, step)
 
 
 #: A mode that fits this much worse than the best keeps so small a share, and can come back.
 LEAST_LIKELIHOOD = 1e-100
-
-
-class ModeTrack(NamedTuple):
-    """A `Track` and how probable each of the K motion models was after each of the N rows."""
-
-    track: Track
-    probabilities: Array  # (N, K), NaN before the start
 
 
 def run_imm(
@@ -289,10 +270,7 @@ def run_imm(
     motions: Sequence[Motion],
     mean_stay: Sequence[float],
     start: Start,
-    *,
-    gate_probability: float = 1.0,
-    output_times: ArrayLike | None = None,
-) -> ModeTrack:
+) -> Track:
     """Interacting multiple models over extended filters, H 3.2.3.
 
     All models start alike and equally probable. Innovation, ``S`` and NIS are the mixture's.
@@ -314,15 +292,11 @@ def run_imm(
         switching over a step follow from it for any step.
     start
         ``x`` (n,) and ``P`` (n, n), see `wildlab.tracking.run.Start`.
-    gate_probability
-        Probability that the target's own measurement is let in, H (3.9), in (0, 1]; 1 is no gate.
-    output_times
-        (M,) s, in order; the measurements' own when not given.
 
     Returns
     -------
-    ModeTrack
-        The mixture's track, and how probable each model was after each row.
+    Track
+        The mixture's.
 
     Raises
     ------
@@ -330,24 +304,19 @@ def run_imm(
         As `wildlab.tracking.run.run_filter`; several detections in a frame; fewer than two models, or not
         one ``mean_stay`` above zero for each.
     """
-    given = single_detection(checked(times, measurements, R, gate_probability, output_times, sensor.sizes))
-    check_start(start)
-    check_rows(sensor.rows, len(given.times), "sensor")
-    check_states(sensor, len(start.x))
+    given = single_detection(checked(times, measurements, R, 1.0, None, sensor.sizes))
+    check_sensor(sensor, start, len(given.times))
     K, stay = len(motions), np.asarray(mean_stay, float)
     if K < 2 or stay.shape != (K,) or not (stay > 0).all():
         raise WildlabError(
             f"{K} motion models and mean_stay {tuple(mean_stay)}",
-            "give at least two models, and for each the seconds that it lasts",
+            "give two models or more, and how long each lasts",
             field="mean_stay",
         )
     rates = np.tile(1 / stay[:, None] / (K - 1), (1, K))
     np.fill_diagonal(rates, -1 / stay)
     xs, Ps = [np.asarray(start.x, float)] * K, [np.asarray(start.P, float)] * K
     weights = np.full(K, 1 / K)
-    probabilities = np.full((len(given.times), K), np.nan)
-    if start.row >= 0:
-        probabilities[start.row] = weights
 
     def mixed(means: Sequence[Array], covariances: Sequence[Array], shares: Array) -> tuple[Array, Array]:
         centre = np.tensordot(shares, means, 1)
@@ -379,25 +348,16 @@ def run_imm(
             gaps = [middle + difference(one.innovation, middle, angles_at(sensor, row)) for one, _ in found]
             innovation, S = mixed(gaps, [one.S for one, _ in found], weights)
             nis = float(innovation @ np.linalg.solve(S, innovation))
-            record(track, row, innovation, S, nis, 0, nis <= given.thresholds[row])
-            if track.used[row]:
-                logs = np.array(
-                    [-(one.nis + np.linalg.slogdet(2 * np.pi * one.S)[1]) / 2 for one, _ in found]
-                )
-                weights = weights * np.maximum(np.exp(logs - logs.max()), LEAST_LIKELIHOOD)
-                weights = weights / weights.sum()
-                after = [
-                    correct(*mode, one.innovation, H, given.R[row, 0])
-                    for mode, (one, H) in zip(prior, found, strict=True)
-                ]
-                xs, Ps = [one.x for one in after], [one.P for one in after]
-        probabilities[row] = weights
+            record(track, row, innovation, S, nis, 0, True)
+            logs = np.array([-(one.nis + np.linalg.slogdet(2 * np.pi * one.S)[1]) / 2 for one, _ in found])
+            weights = weights * np.maximum(np.exp(logs - logs.max()), LEAST_LIKELIHOOD)
+            weights = weights / weights.sum()
+            after = [
+                correct(*mode, one.innovation, H, given.R[row, 0])
+                for mode, (one, H) in zip(prior, found, strict=True)
+            ]
+            xs, Ps = [one.x for one in after], [one.P for one in after]
         x, P = mixed(xs, Ps, weights)
         return given.times[row], x, (P + P.T) / 2
 
-    def predict_to(state: State, time: float) -> tuple[Array, Array]:
-        """Each mode goes its own way; between rows none is left for another."""
-        gone = [predict(x, P, *f(time - state[0])) for x, P, f in zip(xs, Ps, motions, strict=True)]
-        return mixed([x for x, _ in gone], [P for _, P in gone], weights)
-
-    return ModeTrack(step_through(given, start, predict_to, step), probabilities)
+    return step_through(given, start, motions[0], step)

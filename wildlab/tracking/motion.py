@@ -227,6 +227,4 @@ def in_steps(dt: float, motion: Motion, longest: float) -> tuple[Array, Array]:
 
 def _check_step(dt: float) -> None:
     if not (0 <= dt < np.inf):
-        raise WildlabError(
-            f"a time step of {dt} s", "sort the times, and leave out what has none", field="dt"
-        )
+        raise WildlabError(f"a time step of {dt} s", "sort the times", field="dt")

@@ -17,17 +17,17 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.covariances import check_covariance, gate_threshold
 from wildlab.geometry.frames import Array
 from wildlab.tracking.association import nearest_detection
-from wildlab.tracking.kalman import correct, predict
-from wildlab.tracking.motion import Motion
-from wildlab.tracking.schmidt import (
+from wildlab.tracking.kalman import (
     Considered,
-    Errors,
+    correct,
     errors_of,
     limit_cross,
+    predict,
     spread_of_prediction,
     update_schmidt,
 )
-from wildlab.tracking.sensors import Sensor, angles_at, check_states, on_state
+from wildlab.tracking.motion import Motion
+from wildlab.tracking.sensors import Sensor, angles_at, on_state
 
 
 class Start(NamedTuple):
@@ -49,6 +49,81 @@ class Start(NamedTuple):
     row: int = -1
 
 
+def start_from_first(
+    times: ArrayLike,
+    positions: ArrayLike,
+    sd_position: float,
+    sd_velocity: float = 0.0,
+    n: int = 4,
+    **more: float,
+) -> Start:
+    """Start on the first georeferenced position, with zero speed (H 6.2.4, 6.3.3).
+
+    Parameters
+    ----------
+    times
+        (N,) s.
+    positions
+        (N, 2) or (N, 3): north, east in n, m, and what is not looked at; the first row with a time and
+        without NaN is taken.
+    sd_position, sd_velocity
+        m and m/s, the same north and east.
+    n
+        Number of states: 2, 4 or 6.
+    more
+        ``sd_acceleration``, m/s^2, with six states; zero where it is left out. No other name is looked at.
+
+    Returns
+    -------
+    Start
+        At the time of that row, which is not used again, with a diagonal ``P`` (n, n).
+
+    Raises
+    ------
+    WildlabError
+        Without any position.
+    """
+    t, p = np.asarray(times, float), np.asarray(positions, float)[:, :2]
+    there = np.flatnonzero(np.isfinite(p).all(axis=1) & np.isfinite(t))
+    if not len(there):
+        raise WildlabError(
+            "no measurement gives a position to start from",
+            "check poses and plane, or give a start",
+            field="positions",
+        )
+    row = int(there[0])
+    sd = np.repeat([sd_position, sd_velocity, more.get("sd_acceleration", 0.0)], 2)[:n]
+    x = np.zeros(n)
+    x[:2] = p[row]
+    return Start(float(t[row]), x, np.diag(sd**2), row)
+
+
+def start_from_position(
+    time: float, position: ArrayLike, covariance: ArrayLike, sd_velocity: float, row: int = -1
+) -> Start:
+    """Start at rest on a position that is known with a covariance.
+
+    Parameters
+    ----------
+    time
+        s.
+    position, covariance
+        (2,) north and east, m in n, and (2, 2), m^2.
+    sd_velocity
+        m/s, the same north and east.
+    row
+        The measurement that the position was made from; -1: none.
+
+    Returns
+    -------
+    Start
+        Of the state ``[pN, pE, vN, vE]``; position and velocity uncorrelated.
+    """
+    x, P = np.zeros(4), np.zeros((4, 4))
+    x[:2], P[:2, :2], P[2:, 2:] = position, covariance, sd_velocity**2 * np.eye(2)
+    return Start(float(time), x, P, row)
+
+
 class Track(NamedTuple):
     """What a filter made of N measurements, asked at M times.
 
@@ -66,7 +141,7 @@ class Track(NamedTuple):
     chosen
         (N,) index of the detection that was nearest, -1 where there was none to choose from.
     limited
-        (N,) bool: the Schmidt filter's cross-covariance had to be shortened here (`schmidt.limit_cross`).
+        (N,) bool: the Schmidt filter's cross-covariance had to be shortened here (`kalman.limit_cross`).
     """
 
     times: Array
@@ -87,15 +162,12 @@ class FilterInputs(NamedTuple):
     z: Array  # (N, K, m)
     R: Array  # (N, K, m, m)
     output_times: Array  # (M,)
-    threshold: float  # largest NIS that is let in
-    thresholds: Array  # (N,) likewise, row by row
+    thresholds: Array  # (N,) largest NIS that is let in
     sizes: NDArray[np.int64] | None = None  # (N,) elements that a row measures; None: all m
 
 
 #: State of a filter: when, estimate, covariance.
 State = tuple[float, Array, Array]
-#: State and a later time -> estimate and covariance then.
-PredictTo = Callable[[State, float], tuple[Array, Array]]
 
 
 def record(track: Track, row: int, innovation: Array, S: Array, nis: float, chosen: int, used: bool) -> None:
@@ -104,21 +176,16 @@ def record(track: Track, row: int, innovation: Array, S: Array, nis: float, chos
     track.chosen[row], track.used[row] = chosen, used
 
 
-def predict_by_motion(motion: Motion) -> PredictTo:
-    """Prediction with a motion model."""
-    return lambda state, time: predict(state[1], state[2], *motion(time - state[0]))
-
-
 def step_through(
     given: FilterInputs,
     start: Start,
-    predict_to: PredictTo,
+    motion: Motion,
     step: Callable[[int, State, Track], State | None],
 ) -> Track:
     """Apply a filter's ``step`` to the rows in order, and predict to the requested times in between.
 
-    ``predict_to`` gives estimate and covariance at a later time; ``step`` gives the state after a row, and
-    may leave it at an earlier time. None ends the track: it has no estimates from that row on.
+    ``step`` gives the state after a row, and may leave it at an earlier time. None ends the track: it has
+    no estimates from that row on.
     """
     N, _, m = given.z.shape
     M, n = len(given.output_times), len(start.x)
@@ -142,7 +209,8 @@ def step_through(
 
     def write_until(time: float, out: int) -> int:
         while out < M and given.output_times[out] < time:
-            track.x[out], track.P[out] = predict_to(state, float(given.output_times[out]))
+            then, x, P = state
+            track.x[out], track.P[out] = predict(x, P, *motion(float(given.output_times[out]) - then))
             out += 1
         return out
 
@@ -154,7 +222,7 @@ def step_through(
         state = after
     else:
         write_until(np.inf, out)
-    if given.sizes is not None:  # what a row does not measure was told and not seen
+    if given.sizes is not None:  # what a row does not measure was given and not seen
         absent = np.arange(m) >= given.sizes[:, None]
         track.innovation[absent] = np.nan
         track.S[absent[:, :, None] | absent[:, None, :]] = np.nan
@@ -208,18 +276,17 @@ def checked(
         marked[known] = bad
         row = int(np.flatnonzero(np.broadcast_to(marked, (N, K)).any(axis=1))[0])
         raise WildlabError(
-            f"R of row {row} is not a covariance: it is not symmetric or not positive definite",
-            "give every measurement a noise in all its elements",
+            f"R of row {row} is not symmetric or not positive definite",
+            "give every element a noise",
             field="R",
         )
     # A measurement of which a part is missing is none, and neither is one without a covariance.
     usable = np.where((known & np.isfinite(z).all(axis=-1))[..., None], z, np.nan)
-    threshold = gate_threshold(gate_probability, m)
-    thresholds = np.full(N, threshold)
+    thresholds = np.full(N, gate_threshold(gate_probability, m))
     if sizes is not None:
         for size in np.unique(sizes):
             thresholds[sizes == size] = gate_threshold(gate_probability, int(size))
-    return FilterInputs(t, usable, np.broadcast_to(R, (N, K, m, m)), out, threshold, thresholds, sizes)
+    return FilterInputs(t, usable, np.broadcast_to(R, (N, K, m, m)), out, thresholds, sizes)
 
 
 def _filled(z: Array, R: Array, sizes: NDArray[np.int64]) -> tuple[Array, Array]:
@@ -247,21 +314,29 @@ def single_detection(given: FilterInputs) -> FilterInputs:
     return given
 
 
-def check_start(start: Start) -> None:
-    """Refuse a start that is not finite, whose shapes do not fit, or whose ``P`` is no covariance.
+def check_sensor(sensor: Sensor, start: Start, rows: int) -> None:
+    """Refuse a start that is none, and a sensor that does not go with it or with so many rows."""
+    check_start(start)
+    check_rows(sensor.rows, rows, "sensor")
+    if sensor.states > len(start.x):
+        raise WildlabError(
+            f"a sensor of {sensor.states} states for a motion model of {len(start.x)}",
+            "use a model with velocity, as constant_velocity",
+            field="sensor",
+        )
 
-    ``x`` may be (n,) or (B, n), ``P`` (n, n) or (B, n, n).
-    """
+
+def check_start(start: Start) -> None:
+    """Refuse a start that is not finite, whose shapes do not fit, or whose ``P`` is no covariance."""
     x, P = np.asarray(start.x, float), np.asarray(start.P, float)
-    if x.ndim not in (1, 2) or P.ndim not in (2, 3) or P.shape[-2:] != (x.shape[-1],) * 2:
+    if x.ndim != 1 or P.shape != (len(x), len(x)):
         raise WildlabError(f"x of the shape {x.shape}, P {P.shape}", "give (n,) and (n, n)", field="start")
     if not np.isfinite(start.time):
         raise WildlabError(f"a time of {start.time}", "give seconds", field="start.time")
-    lost = np.argwhere(~np.isfinite(x))
+    lost = np.flatnonzero(~np.isfinite(x))
     if len(lost):
-        row = ", ".join(str(i) for i in lost[0])
         raise WildlabError(
-            f"row {row} is {x[tuple(lost[0])]}", "give every state a value to start from", field="start.x"
+            f"row {lost[0]} is {x[lost[0]]}", "give every state a value to start from", field="start.x"
         )
     check_covariance(P, "start.P")
 
@@ -283,7 +358,7 @@ def _check_order(times: Array, field: str) -> None:
         row = int(back[0]) + 1
         raise WildlabError(
             f"row {row} at {times[row]} s comes after row {row - 1} at {times[row - 1]} s",
-            "sort the rows by time, with all that belongs to them",
+            "sort the rows by time",
             field=field,
         )
 
@@ -324,6 +399,7 @@ def run_filter(
     gate_probability: float = 1.0,
     output_times: ArrayLike | None = None,
     ends: Ends | None = None,
+    steps: list[Step] | None = None,
 ) -> Track:
     """Kalman filter on positions; extended filter on pixels, bearings, ranges; Schmidt filter with ``pose``.
 
@@ -356,6 +432,8 @@ def run_filter(
     ends
         When the track ends: asked at every row behind the start, see `Ends`. From there on there are no
         estimates. None: never.
+    steps
+        Is filled with what was done at every row, for a smoother.
 
     Returns
     -------
@@ -382,35 +460,22 @@ def run_filter(
     >>> track.x[-1].round(2).tolist(), np.sqrt(track.P[-1, 0, 0]).round(2).item()
     ([9.97, 0.0], 0.58)
     """
-    return filter_in_steps(
-        times, measurements, R, sensor, motion, start, pose=pose, gate_probability=gate_probability,
-        output_times=output_times, ends=ends,
-    )[0]  # fmt: skip
-
-
-def filter_in_steps(
-    times: ArrayLike,
-    measurements: ArrayLike,
-    R: ArrayLike,
-    sensor: Sensor,
-    motion: Motion,
-    start: Start,
-    *,
-    pose: Considered | None = None,
-    gate_probability: float = 1.0,
-    output_times: ArrayLike | None = None,
-    ends: Ends | None = None,
-) -> tuple[Track, list[Step], Errors | None]:
-    """`run_filter`, with what it did at every row, and the considered errors as it worked with them."""
     given = checked(times, measurements, R, gate_probability, output_times, sensor.sizes)
-    check_start(start)
-    check_rows(sensor.rows, len(given.times), "sensor")
-    check_states(sensor, len(start.x))
+    check_sensor(sensor, start, len(given.times))
     errors = errors_of(pose, sensor, len(given.times))
-    n, steps = len(start.x), list[Step]()
-    C = np.zeros((n, 0 if errors is None else errors.k))
+    n, steps = len(start.x), [] if steps is None else steps
+    C = np.zeros((n, 0 if errors is None else len(errors.times)))
 
-    last, x_last = _first_row(start, given.times), np.asarray(start.x, float)
+    x_last, P_first = np.asarray(start.x, float), np.asarray(start.P, float)
+    # The row that a start was made from, or the first that is not before it.
+    last = (
+        start.row
+        if start.row >= 0
+        else min(int(np.searchsorted(given.times, start.time)), len(given.times) - 1)
+    )
+    steps.append(
+        Step(last, float(start.time), np.eye(n), np.zeros((n, n)), x_last, P_first, C, x_last, P_first, C)
+    )
 
     def step(row: int, state: State, track: Track) -> State | None:
         nonlocal C, last, x_last
@@ -433,7 +498,7 @@ def filter_in_steps(
         if errors is None:
             spread = H @ P @ H.T
         else:
-            P_pose, H_errors = errors.covariance[row], errors.of(expected.H_pose)
+            P_pose, H_errors = errors.covariance[row], expected.H_pose[..., errors.columns]
             if not (np.isfinite(P_pose).all() and np.isfinite(H_errors).all()):
                 return now, x, P
             C, track.limited[row] = limit_cross(C.copy(), P.copy(), P_pose.copy())
@@ -459,9 +524,4 @@ def filter_in_steps(
         steps[-1] = done._replace(x=x, P=P, C=C, gain=gain, H=H, H_errors=H_errors, R=noise)
         return now, x, P
 
-    return step_through(given, start, predict_by_motion(motion), step), steps, errors
-
-
-def _first_row(start: Start, times: Array) -> int:
-    """The row that a start was made from, or the first that is not before it."""
-    return start.row if start.row >= 0 else min(int(np.searchsorted(times, start.time)), len(times) - 1)
+    return step_through(given, start, motion, step)

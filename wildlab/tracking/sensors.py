@@ -153,8 +153,6 @@ def predict_position(position: ArrayLike, platform: ArrayLike) -> Prediction:
     return Prediction(p, np.broadcast_to(np.eye(2), (*p.shape, 2)), pose)
 
 
-#: Row and measurement -> where a ray starts and where it goes, (3,) and (3,) in n.
-Ray = Callable[[int, Array], tuple[Array, Array]]
 #: Of the distance over which derivatives are compared, m: small beside any distance to a target, and large
 #: beside what rounding does to coordinates of kilometres.
 STEP_M = 0.01
@@ -173,12 +171,8 @@ class Sensor(NamedTuple):
         For how many rows it was made; None: for any number.
     states
         How many of the first states it is given: 4 are position and velocity.
-    elements
-        (m,) what the elements are called: the bias of one is ``"<element>_bias"``.
     considers
         (k,) the errors that ``H_pose`` has derivatives for, by name.
-    ray
-        For a start: the ray of a measurement. None where it has none.
     sizes, row_angles
         (N,) and (N, m): where rows measure different things, how many of the m elements each has, which come
         first, and which of them are angles. None: all rows alike. See `wildlab.tracking.sensors`.
@@ -188,9 +182,7 @@ class Sensor(NamedTuple):
     angles: tuple[bool, ...]
     rows: int | None = None
     states: int = 2
-    elements: tuple[str, ...] = ()
     considers: tuple[str, ...] = POSE
-    ray: Ray | None = None
     sizes: NDArray[np.int64] | None = None
     row_angles: NDArray[np.bool_] | None = None
 
@@ -213,16 +205,6 @@ def on_state(H_position: Array, n: int) -> Array:
     return H
 
 
-def check_states(sensor: Sensor, n: int) -> None:
-    """Refuse a sensor that sees more than the ``n`` states of a motion model."""
-    if sensor.states > n:
-        raise WildlabError(
-            f"a sensor of {sensor.states} states for a motion model of {n}",
-            "use a model with velocity, as constant_velocity",
-            field="sensor",
-        )
-
-
 def row_of(values: ArrayLike, row: int, base: int) -> Array:
     """Row of (N, ...), or the one value of all rows; ``base`` is the number of axes of a single value."""
     a = np.asarray(values, float)
@@ -241,7 +223,7 @@ def positions() -> Sensor:
     def predict(row: int, position: Array) -> Prediction:
         return Prediction(np.array(position, float), np.eye(2), np.zeros((2, 6)))
 
-    return Sensor(predict, (False, False), elements=("north", "east"))
+    return Sensor(predict, (False, False))
 
 
 def pixels(poses: CameraPoses, plane_down: ArrayLike) -> Sensor:
@@ -273,7 +255,7 @@ def pixels(poses: CameraPoses, plane_down: ArrayLike) -> Sensor:
     def predict(row: int, position: Array) -> Prediction:
         return predict_pixel(position, poses.take(row), row_of(plane_down, row, 0))
 
-    return Sensor(predict, (False, False), rows[0] if rows else None, elements=("u", "v"))
+    return Sensor(predict, (False, False), rows[0] if rows else None)
 
 
 def renamed(sensor: Sensor, names: Mapping[str, str]) -> Sensor:
@@ -318,8 +300,8 @@ class Merged(NamedTuple):
     """Several sensors' rows in order of time, as a filter takes them; see `merge`."""
 
     times: Array  # (N,)
-    measurements: Array  # (N, m), or (N, K, m); NaN behind the elements that a row has
-    R: Array  # (N, m, m), or (N, K, m, m)
+    measurements: Array  # (N, K, m); NaN behind the elements that a row has
+    R: Array  # (N, K, m, m)
     sensor: Sensor
     which: NDArray[np.int64]  # (N,) the sensor of a row
     rows: NDArray[np.int64]  # (N,) its row there
@@ -335,7 +317,7 @@ def combined(sensors: Sequence[Sensor], which: ArrayLike) -> Sensor:
     Parameters
     ----------
     sensors
-        Each made for all N rows, or for its own rows only, in their order, or for any number.
+        Each made for its own rows only, in their order, or for any number.
     which
         (N,) index of the sensor of each row.
 
@@ -347,30 +329,18 @@ def combined(sensors: Sequence[Sensor], which: ArrayLike) -> Sensor:
     Raises
     ------
     WildlabError
-        For indices that there are no sensors for, or a sensor of another number of rows.
+        For a sensor of another number of rows.
     """
     kinds = np.asarray(which, np.int64)
-    if (
-        kinds.ndim != 1
-        or not len(sensors)
-        or (len(kinds) and not (0 <= kinds.min() <= kinds.max() < len(sensors)))
-    ):
-        raise WildlabError(
-            f"rows of the sensors {sorted(set(kinds.ravel().tolist()))} of {len(sensors)}",
-            "give the index of a sensor for each row", field="which",
-        )  # fmt: skip
-    N, own_row = len(kinds), np.arange(len(kinds))
+    own_row = np.zeros(len(kinds), np.int64)
     for i, sensor in enumerate(sensors):
         mine = np.flatnonzero(kinds == i)
-        if sensor.sizes is not None:
-            raise WildlabError(f"sensor {i} is a combined one", "combine all at once", field="sensors")
-        if sensor.rows not in (None, N, len(mine)):
+        own_row[mine] = np.arange(len(mine))
+        if sensor.rows not in (None, len(mine)):
             raise WildlabError(
-                f"sensor {i} is made for {sensor.rows} rows, and has {len(mine)} of {N}",
-                "make it for its own rows, or for all", field="sensors",
+                f"sensor {i} is made for {sensor.rows} rows, and has {len(mine)}", "make it for its own rows",
+                field="sensors",
             )  # fmt: skip
-        if sensor.rows is not None and sensor.rows != N:
-            own_row[mine] = np.arange(len(mine))
     m = max(len(sensor.angles) for sensor in sensors)
     states = max(sensor.states for sensor in sensors)
     names = tuple(dict.fromkeys(name for sensor in sensors for name in sensor.considers))
@@ -388,7 +358,7 @@ def combined(sensors: Sequence[Sensor], which: ArrayLike) -> Sensor:
         return Prediction(z, H, H_pose)
 
     return Sensor(
-        predict, tuple(bool(one.any()) for one in angles.T), N, states, considers=names,
+        predict, tuple(bool(one.any()) for one in angles.T), len(kinds), states, considers=names,
         sizes=sizes[kinds], row_angles=angles[kinds],
     )  # fmt: skip
 
@@ -399,7 +369,7 @@ def merge(parts: Sequence[SensorMeasurements]) -> Merged:
     Parameters
     ----------
     parts
-        Of each sensor.
+        Of each sensor; of one alone the sensor stays as it is.
 
     Returns
     -------
@@ -409,64 +379,45 @@ def merge(parts: Sequence[SensorMeasurements]) -> Merged:
     Raises
     ------
     WildlabError
-        For nothing, shapes that do not fit each other, and as `combined`.
+        For shapes that do not fit each other, and as `combined`.
     """
-    if not parts:
-        raise WildlabError("no sensor", "give what one measured, or more", field="parts")
     times = [np.asarray(one.times, float) for one in parts]
     values = [np.asarray(one.measurements, float) for one in parts]
     values = [z[:, None] if z.ndim == 2 else z for z in values]
+    shape = tuple(max(z.shape[axis] for z in values) for axis in (1, 2))
+    padded = []
     for i, (t, z, one) in enumerate(zip(times, values, parts, strict=True)):
-        if t.ndim != 1 or z.ndim != 3 or len(z) != len(t) or z.shape[2] != len(one.sensor.angles):
+        R = np.asarray(one.R, float)
+        if len(z) != len(t) or z.shape[2] != len(one.sensor.angles):
             raise WildlabError(
-                f"{t.shape} times and {np.shape(one.measurements)} measurements of sensor {i}",
+                f"{t.shape} times and {z.shape} measurements of sensor {i}",
                 f"give (N,) and (N, {len(one.sensor.angles)}), or (N, K, {len(one.sensor.angles)})",
                 field="parts",
             )
-    K, m = max(z.shape[1] for z in values), max(z.shape[2] for z in values)
-    which = np.concatenate([np.full(len(t), i) for i, t in enumerate(times)])
+        _, k, size = z.shape
+        z_all, R_all = np.full((len(z), *shape), np.nan), np.full((len(z), *shape, shape[1]), np.nan)
+        z_all[:, :k, :size], R_all[:, :k, :size, :size] = z, R[:, None] if R.ndim == 3 else R
+        padded.append((z_all, R_all))
+    which = np.repeat(np.arange(len(parts)), [len(t) for t in times])
     rows = np.concatenate([np.arange(len(t)) for t in times])
     order = np.argsort(np.concatenate(times), kind="stable")
-    N = len(which)
-    z_all, R_all = np.full((N, K, m), np.nan), np.full((N, K, m, m), np.nan)
-    for i, (z, one) in enumerate(zip(values, parts, strict=True)):
-        _, k, size = z.shape
-        R = np.asarray(one.R, float)
-        R = R[:, None] if R.ndim == 3 else R
-        mine = which == i
-        z_all[mine, :k, :size] = z
-        try:
-            block = np.broadcast_to(R, (len(z), k, size, size))
-        except ValueError as error:
-            raise WildlabError(
-                f"R of the shape {np.shape(one.R)} for {z.shape} measurements of sensor {i}",
-                "give (m, m), (N, m, m) or (N, K, m, m)", field="R",
-            ) from error  # fmt: skip
-        padded = np.full((len(z), K, m, m), np.nan)
-        padded[:, :k, :size, :size] = block
-        R_all[mine] = padded
+    z, R = (np.concatenate(one)[order] for one in zip(*padded, strict=True))
     which, rows = which[order], rows[order]
     own = [_of_rows(one.sensor, rows[which == i]) for i, one in enumerate(parts)]
     sensor = combined(own, which) if len(own) > 1 else own[0]
-    z_all, R_all = z_all[order], R_all[order]
-    if K == 1:
-        z_all, R_all = z_all[:, 0], R_all[:, 0]
-    return Merged(np.concatenate(times)[order], z_all, R_all, sensor, which, rows)
+    return Merged(np.concatenate(times)[order], z, R, sensor, which, rows)
 
 
-def cut(merged: Merged, rows: slice) -> Merged:
-    """Some rows, one after the other."""
-    sensor, first, n = merged.sensor, rows.start, len(merged.times)
-    if rows == slice(0, n):
-        return merged
+def head(merged: Merged, count: int) -> Merged:
+    """The first rows, so many."""
+    sensor = merged.sensor
     part = sensor._replace(
-        predict=lambda row, state: sensor.predict(row + first, state),
-        rows=len(merged.times[rows]),
-        sizes=None if sensor.sizes is None else sensor.sizes[rows],
-        row_angles=None if sensor.row_angles is None else sensor.row_angles[rows],
+        rows=count,
+        sizes=None if sensor.sizes is None else sensor.sizes[:count],
+        row_angles=None if sensor.row_angles is None else sensor.row_angles[:count],
     )
     times, z, R, _, which, own = merged
-    return Merged(times[rows], z[rows], R[rows], part, which[rows], own[rows])
+    return Merged(times[:count], z[:count], R[:count], part, which[:count], own[:count])
 
 
 def _of_rows(sensor: Sensor, rows: NDArray[np.int64]) -> Sensor:

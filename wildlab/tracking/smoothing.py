@@ -24,9 +24,9 @@ from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
+from wildlab.tracking.kalman import Considered, Errors, errors_of
 from wildlab.tracking.motion import Motion
-from wildlab.tracking.run import Start, Step, Track, filter_in_steps
-from wildlab.tracking.schmidt import Considered, Errors
+from wildlab.tracking.run import Start, Step, Track, run_filter
 from wildlab.tracking.sensors import Sensor
 
 #: Variances of a correction below this share of the prediction's count as zero: rounding.
@@ -68,7 +68,7 @@ def smooth(track: Track, motion: Motion) -> Track:
     if len(track.times) != len(track.nis):
         raise WildlabError(
             f"estimates at {len(track.times)} times of {len(track.nis)} measurements",
-            "give the track at the times of its measurements, or use run_smoothed", field="track",
+            "give it at the measurements' times, or use run_smoothed", field="track",
         )  # fmt: skip
     x, P = track.x.copy(), track.P.copy()
     begun = np.flatnonzero(np.isfinite(x).all(axis=1))
@@ -88,13 +88,12 @@ def run_smoothed(
     start: Start,
     *,
     pose: Considered | None = None,
-    gate_probability: float = 1.0,
 ) -> Track:
     """`run_filter`, and back over what it found.
 
     Parameters
     ----------
-    times, measurements, R, sensor, motion, start, pose, gate_probability
+    times, measurements, R, sensor, motion, start, pose
         As in `run_filter`.
 
     Returns
@@ -107,19 +106,17 @@ def run_smoothed(
     WildlabError
         As `run_filter`.
     """
-    track, steps, errors = filter_in_steps(
-        times, measurements, R, sensor, motion, start, pose=pose, gate_probability=gate_probability
-    )  # fmt: skip
+    steps = list[Step]()
+    track = run_filter(times, measurements, R, sensor, motion, start, pose=pose, steps=steps)
+    errors = errors_of(pose, sensor, len(track.times))
     if errors is None:
         return smooth(track, motion)
-    steps = [_first(start, steps[0].row if steps else 0, errors.k), *steps]
     nodes = _smooth_considered(steps, errors)
     x, P = track.x.copy(), track.P.copy()
     node_times = np.array([one.time for one in steps])
-    for out, time in enumerate(track.times):
-        i = int(np.searchsorted(node_times, time, "right")) - 1
-        if i >= 0 and time == node_times[i]:
-            x[out], P[out] = nodes[i].x, nodes[i].P
+    last = np.searchsorted(node_times, track.times, "right") - 1
+    for out in np.flatnonzero((last >= 0) & (node_times[last] == track.times)):
+        x[out], P[out] = nodes[last[out]].x, nodes[last[out]].P
     return track._replace(x=x, P=P)
 
 
@@ -133,14 +130,6 @@ class _Node(NamedTuple):
     N: Array
     psi: Array  # (k, k) from the row before
     P_errors: Array  # (k, k)
-
-
-def _first(start: Start, row: int, k: int) -> Step:
-    """The start, as a row at which nothing was measured."""
-    x, P = np.asarray(start.x, float), np.asarray(start.P, float)
-    n, C = len(x), np.zeros((len(x), k))
-    row = start.row if start.row >= 0 else max(row - 1, 0)
-    return Step(row, float(start.time), np.eye(n), np.zeros((n, n)), x, P, C, x, P, C)
 
 
 def _back(
@@ -171,7 +160,7 @@ def _over_known(cross: Array, covariance: Array, sd: Array) -> Array:
 
 def _smooth_considered(steps: Sequence[Step], errors: Errors) -> list[_Node]:
     """The smoother of the module."""
-    n, k = len(steps[0].x), errors.k
+    n, k = len(steps[0].x), len(errors.times)
     known, unmoved = known_before(errors.covariance), np.eye(n)
     A, B, N = _updated(steps[-1], unmoved, np.zeros((n, k)), np.zeros((n, n)))
     x, P = steps[-1].x, steps[-1].P

@@ -35,7 +35,7 @@ from wildlab.flight.tracking_settings import parse_settings
 from wildlab.geometry.frames import euler_to_matrix, matrix_to_rotation_vector, rotation_vector_to_matrix
 from wildlab.geometry.uncertainty import PoseErrors
 from wildlab.simulation.twins import simulate_twin
-from wildlab.tracking.schmidt import transition_of_pose
+from wildlab.tracking.kalman import transition_of_pose
 from wildlab.tracking.sensors import POSE
 
 ALL = """

@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tests.flight.card.cards import MARKS, TAKEN, gpx, write_card, write_photo
-from wildlab.api.points import georeference
+from wildlab.api.flights import georeference
 from wildlab.cli import wildlab
 from wildlab.errors import WildlabError
 from wildlab.flight.card.importing import import_card, read_card, recipe_beside

@@ -6,14 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 
-from wildlab.errors import WildlabError
-from wildlab.tracking.association import (
-    feature_distances,
-    global_nearest,
-    image_features,
-)
+from wildlab.tracking.association import global_nearest
 
 entries = st.one_of(st.integers(-5, 30), st.sampled_from([np.nan, np.inf]))
 matrices = st.tuples(st.integers(0, 4), st.integers(0, 4)).flatmap(
@@ -67,40 +61,3 @@ def test_without_a_gate_as_many_as_possible_and_the_least_among_those(d):
 def test_the_gate_itself_is_inside():
     assert global_nearest([[9.0]], 9.0).track.tolist() == [0]
     assert global_nearest([[9.1]], 9.0).track.tolist() == [-1]
-
-
-values = arrays(np.float64, (3, 2), elements=st.floats(-50, 50))
-
-
-@given(values, values, arrays(np.float64, 2, elements=st.floats(0, 3)))
-def test_it_is_the_sum_of_its_features(measured, stored, weights):
-    sd = np.array([2.0, 0.5])
-    found = feature_distances(measured, stored, sd, weights)
-    for i, new in enumerate(measured):
-        for j, old in enumerate(stored):
-            expected = sum(w * ((a - b) / s) ** 2 for a, b, s, w in zip(new, old, sd, weights, strict=True))
-            assert found[i, j] == pytest.approx(expected)
-
-
-def test_size_on_the_ground_does_not_depend_on_the_distance():
-    near = image_features([400.0], [10.0], [[0.2] + [0.0] * 6], 0.25)
-    far = image_features([100.0], [10.0], [0.2], 0.5)
-    assert np.allclose(near, far)
-    assert np.allclose(near, [[np.log(25), 10, np.log(0.2)]])
-    assert np.isnan(image_features([0.0], [1.0], [0.0], 1.0)).tolist() == [[True, False, True]]
-
-
-@pytest.mark.parametrize(
-    ("sd", "weights", "words"),
-    [
-        ([1.0], [1.0, 1.0], "do not go with spreads"),
-        ([1.0, 1.0], [1.0], "do not go with spreads"),
-        ([1.0, 0.0], [1.0, 1.0], "sd: a spread of"),
-        ([1.0, np.nan], [1.0, 1.0], "sd: a spread of"),
-        ([1.0, 1.0], [1.0, -1.0], "weights: weights of"),
-        ([1.0, 1.0], [1.0, np.inf], "weights: weights of"),
-    ],
-)
-def test_features_that_do_not_fit_are_refused(sd, weights, words):
-    with pytest.raises(WildlabError, match=words):
-        feature_distances([[1.0, 2.0]], [[1.0, 2.0]], sd, weights)

@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from tests.tracking.many.enumeration import association_probabilities_by_enumeration
 from tests.tracking.poses import GENERATORS
 from wildlab.geometry.covariances import gate_threshold
+from wildlab.studies.crossing_vessels import pair_scans
 from wildlab.tracking.association import (
     association_probabilities,
     belief_propagation,
 )
-from wildlab.tracking.many.bank import pair_scans
 from wildlab.tracking.many.tracks import after_scan, still_there, visible_later, weights
 
 shares = st.floats(0.01, 0.99)

@@ -13,11 +13,11 @@ from scipy.stats import multivariate_normal, norm
 from tests.tracking.many.test_run import EYE, POINTS, lines, look, looks
 from tests.tracking.poses import GENERATORS
 from wildlab.tracking.association import association_probabilities
-from wildlab.tracking.many.run import follow_many, moved_together, told_by_others
+from wildlab.tracking.kalman import update_schmidt
+from wildlab.tracking.many.run import follow_many, learnt_from_others, moved_together
 from wildlab.tracking.many.target_model import Scan
 from wildlab.tracking.many.tracks import Compared, compare, compare_bearings, update
 from wildlab.tracking.motion import white_acceleration
-from wildlab.tracking.schmidt import update_schmidt
 from wildlab.tracking.sensors import left_out
 
 H = np.eye(2, 4)
@@ -226,7 +226,7 @@ def test_together_is_near_the_sum_over_all_ways():
 def test_what_others_tell_is_the_least_squares_of_them(rng):
     """Sure associations: the errors' posterior is that of all other targets' innovations at once."""
     compared = _drawn(rng, 4, 3, 2.0)
-    mean, covariance = told_by_others(compared, np.eye(4)[:, None])
+    mean, covariance = learnt_from_others(compared, np.eye(4)[:, None])
     nu, S, _, _, G = (part[:, 0] for part in compared)
     for t in range(4):
         others = [u for u in range(4) if u != t]
@@ -246,7 +246,7 @@ def test_what_nobody_is_sure_of_tells_little():
     one = Compared(*(np.stack([part, part])[:, None] for part in (nu, S)), np.ones((2, 1, 2)), np.zeros(0),
                    np.stack([G, G])[:, None])  # fmt: skip
     share, probable = np.array([0.25, 0.75]), 0.6
-    mean, covariance = told_by_others(one, np.tile(probable * share, (2, 1, 1)))
+    mean, covariance = learnt_from_others(one, np.tile(probable * share, (2, 1, 1)))
     middle = share @ nu
     off = nu - middle
     spread = np.eye(2) + np.einsum("m,mi,mj->ij", share, off, off)

@@ -1,1 +1,1 @@
-"""Targets tracked through a flight: looks, beliefs, starts, filters, and how far to believe the tracks."""
+"""Targets tracked through a flight: scans, noise, starts, filters, and how good the tracks are."""

@@ -1,9 +1,9 @@
-"""Where on the ground a sensor's detections lie, look by look, and what those of a look have in common:
+"""Where on the ground a sensor's detections lie, scan by scan, and what those of a scan have in common:
 errors of the pose, the mount, the ground and the sensor.
 
-Each error is told as what one standard deviation of it moves every detection's place by, so that all have
+Each error is given as what one standard deviation of it moves every detection's place by, so that all have
 variance one. Of a pose whose covariance changes along the flight the six errors keep their identity as the
-Schmidt filter keeps it (``bias`` of `wildlab.tracking.schmidt`).
+Schmidt filter keeps it (``bias`` of `wildlab.tracking.kalman`).
 """
 
 from __future__ import annotations
@@ -25,13 +25,15 @@ from wildlab.analysis.georeference import (
 )
 from wildlab.analysis.tracks.noise_model import (
     ASSUMED,
+    OF_PLATFORM,
     STATED,
     GivenValue,
+    GivenValues,
     NoiseModel,
     errors_named,
     errors_of,
 )
-from wildlab.analysis.tracks.scans import SLOTS, Scans, predict_scan
+from wildlab.analysis.tracks.scans import PLACEABLE, PLACED, SLOTS, Scans, predict_scan
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
 from wildlab.flight.tracking_settings import SensorPart
@@ -41,9 +43,9 @@ from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import pixels_to_terrain
 from wildlab.geometry.uncertainty import GroundJacobians, PoseErrors, ground_jacobians, terrain_jacobians
 from wildlab.tracking.filters import thin
+from wildlab.tracking.kalman import transition_of_pose, transitions_of_pose
 from wildlab.tracking.many import Scan
 from wildlab.tracking.many.target_model import Sees
-from wildlab.tracking.schmidt import transition_of_pose, transitions_of_pose
 from wildlab.tracking.sensors import POSE
 
 #: An error of the clock moves a target by its speed, which nobody knows before it is tracked.
@@ -57,14 +59,6 @@ class CorrelatedErrors(NamedTuple):
     lasting_s: tuple[float, ...]
 
 
-#: Angles of `wildlab.analysis.georeference.USUAL`.
-_DEGREES = {"roll": "tilt_deg", "pitch": "tilt_deg", "heading": "heading_deg"}
-_METRES = {
-    "platform_north": "position_horizontal_m",
-    "platform_east": "position_horizontal_m",
-    "platform_down": "position_vertical_m",
-}
-_OF_PLATFORM = _METRES | _DEGREES
 _SHARED = {
     "position_horizontal_m": "error of the camera's position, SD of north and of east",
     "position_vertical_m": "error of the camera's height, SD",
@@ -81,7 +75,7 @@ NO_ERRORS = CorrelatedErrors((), ())
 
 
 def camera_errors(flight: Flight, observed: Observations, beliefs: NoiseModel) -> PoseErrors:
-    """What georeferenced pixels may be wrong by, as filters of one target are told.
+    """What georeferenced pixels may be wrong by, as filters of one target are given.
 
     That is `pose_errors` with the noise of pixels that the sensor is believed to have. Errors of the pose
     that are considered come on top of a covariance that poses have, and take the place of what is assumed.
@@ -104,8 +98,10 @@ def camera_errors(flight: Flight, observed: Observations, beliefs: NoiseModel) -
 def pose_deviations(flight: Flight, beliefs: NoiseModel) -> Array:
     """(6,) of the errors of `POSE`, m and rad, of poses without a covariance of their own."""
     usual = assumed_deviations(flight)
-    found = [np.radians(usual[key]) if name in _DEGREES else usual[key] for name, key in _OF_PLATFORM.items()]
-    sds = dict(zip(_OF_PLATFORM, found, strict=True))
+    sds = {
+        name: float(np.radians(usual[key])) if key.endswith("deg") else usual[key]
+        for name, key in OF_PLATFORM.items()
+    }
     sds |= {one.name: one.sd for one in beliefs.considered if one.name in POSE}
     return np.array([sds[name] for name in POSE])
 
@@ -133,28 +129,24 @@ def roots_of_deviations(R_nb: Array, sd: Array) -> Array:
     return roots
 
 
-def given_of_pixels(flight: Flight, scans: Scans, part: SensorPart | None) -> list[GivenValue]:
-    """What is believed of the errors that all pixels of an image share, and who says so."""
-    said, stated = [], flight.manifest.uncertainty
-    stated_names = {} if part is None else part.considered
-    taken = {_OF_PLATFORM.get(each) for name in stated_names for each in errors_named(name)}
+def given_of_pixels(flight: Flight, scans: Scans, part: SensorPart) -> list[GivenValue]:
+    """What is assumed of the errors that all pixels of an image share, and who says so."""
+    given, stated = GivenValues(scans.sensor), flight.manifest.uncertainty
+    taken = {OF_PLATFORM.get(each) for name in part.considered for each in errors_named(name)}
     own = scans.poses is not None and scans.poses.covariance is not None
     if own:
-        said.append(GivenValue(scans.sensor, "errors of the pose", "as the poses say", "the poses' own"))
+        given.add("errors of the pose", "as the poses say", "the poses' own")
     for key, value in assumed_deviations(flight).items():
         if key not in _SHARED or key in taken or (own and key not in _OF_THE_MOUNT_AND_GROUND):
             continue
         unit = "°" if key.endswith("deg") else " m"
-        source = ASSUMED if getattr(stated, key) is None else STATED
-        said.append(GivenValue(scans.sensor, _SHARED[key], f"{value:.3g}{unit}", source))
+        given.number(_SHARED[key], unit, getattr(stated, key), value)
     lasts = pose_correlation_time(part)
     words = (
-        "another at each look" if lasts == 0 else "the whole flight" if np.isinf(lasts) else f"{lasts:.3g} s"
+        "another at each scan" if lasts == 0 else "the whole flight" if np.isinf(lasts) else f"{lasts:.3g} s"
     )
-    said.append(
-        GivenValue(scans.sensor, "how long errors of the pose last", words, ASSUMED if lasts == 0 else STATED)
-    )
-    return said
+    given.add("how long errors of the pose last", words, ASSUMED if lasts == 0 else STATED)
+    return given.values
 
 
 def errors_of_poses(
@@ -249,8 +241,7 @@ def errors_of_elements(scans: Scans, beliefs: NoiseModel, places: Array) -> tupl
     if stated is None:
         return np.zeros((*places.shape, 0)), NO_ERRORS
     kept = [i for i, name in enumerate(stated.names) if name != UNKNOWN_EFFECT]
-    names = [stated.names[i] for i in kept]
-    columns = [SLOTS[scans.kind].index(name) for name in names]
+    columns = [SLOTS[scans.kind].index(stated.names[i]) for i in kept]
     sd = np.sqrt(np.diagonal(stated.covariance, axis1=1, axis2=2)[:, kept])
     shared = np.full((*places.shape, len(kept)), np.nan)
     for k in range(places.shape[1]):
@@ -260,20 +251,17 @@ def errors_of_elements(scans: Scans, beliefs: NoiseModel, places: Array) -> tupl
         # The detection is given: what an error adds to it, the place must take away.
         back = np.linalg.pinv(np.nan_to_num(seen.H_position[..., :2])) @ seen.H_pose[..., columns]
         shared[:, k] = np.where(known[:, None, None], back, np.nan) * sd[:, None]
-    times = np.broadcast_to(np.asarray(stated.correlation_time, float), len(stated.names))
-    common = stated.shared or (True,) * len(stated.names)
-    own = tuple(name if common[i] else f"{scans.sensor}: {name}" for i, name in zip(kept, names, strict=True))
-    return shared, CorrelatedErrors(own, tuple(float(times[i]) for i in kept))
+    own = tuple(stated.names[i] if stated.shared[i] else f"{scans.sensor}: {stated.names[i]}" for i in kept)
+    times = np.broadcast_to(stated.correlation_time, len(stated.names))[kept]
+    return shared, CorrelatedErrors(own, tuple(times.tolist()))
 
 
-def pose_correlation_time(part: SensorPart | None) -> float:
+def pose_correlation_time(part: SensorPart) -> float:
     """For how long errors of a camera's pose last, s: as stated, or the shortest time of those considered.
 
-    Zero, another error at each look, where nobody says: a part of them fades within seconds, and a track that
+    Zero, another error at each scan, where nobody says: a part of them fades within seconds, and a track that
     took them for constant would be left by its own detections.
     """
-    if part is None:
-        return 0.0
     if part.correlation_time_s is not None:
         return float(part.correlation_time_s)
     of_pose = [one for name, one in part.considered.items() if set(errors_named(name)) <= set(POSE)]
@@ -297,7 +285,7 @@ def _pose_roots(observed: Observations, errors: PoseErrors) -> Array:
     roots = np.full((len(times), 6, 6), np.nan)
     if not known.any():
         return roots
-    _, first, look = np.unique(times[known], return_index=True, return_inverse=True)
+    _, first, scan = np.unique(times[known], return_index=True, return_inverse=True)
     own = covariances[known][first]
     sd = np.sqrt(np.maximum(np.diagonal(own, axis1=1, axis2=2)[0], 0.0))
     unit = np.divide(1, sd, out=np.zeros_like(sd), where=sd > 0)
@@ -306,7 +294,7 @@ def _pose_roots(observed: Observations, errors: PoseErrors) -> Array:
     at[0] = sd[:, None] * (axes * np.sqrt(np.maximum(values, 0.0))) @ axes.T
     for row, change in enumerate(transitions_of_pose(own)[1:], start=1):
         at[row] = change @ at[row - 1]
-    roots[known] = at[look]
+    roots[known] = at[scan]
     return roots
 
 
@@ -318,26 +306,26 @@ def align_errors(
     Parameters
     ----------
     parts
-        For each sensor its errors, and of each of its looks (M, 2, k); None where they move nothing.
+        For each sensor its errors, and of each of its scans (M, 2, k); None where they move nothing.
 
     Returns
     -------
     lasting_s, shared
         (K,) of all errors that move anything, the shorter time where sensors differ; and for each sensor and
-        look (M, 2, K).
+        scan (M, 2, K).
     """
     lasting: dict[str, float] = {}
-    for errors, looks in parts:
+    for errors, scans in parts:
         for i, (name, lasts) in enumerate(zip(*errors, strict=True)):
-            if any(one is not None and one[..., i].any() for one in looks):
+            if any(one is not None and one[..., i].any() for one in scans):
                 lasting[name] = min(lasts, lasting.get(name, np.inf))
     columns = {name: i for i, name in enumerate(lasting)}
     found = []
-    for errors, looks in parts:
+    for errors, scans in parts:
         kept = [i for i, name in enumerate(errors.names) if name in columns]
         to = [columns[errors.names[i]] for i in kept]
         mine = []
-        for one in looks:
+        for one in scans:
             shared = np.zeros((0 if one is None else len(one), 2, len(columns)))
             if one is not None:
                 shared[..., to] = one[..., kept]
@@ -346,11 +334,8 @@ def align_errors(
     return tuple(lasting.values()), found
 
 
-#: Kinds of detections that tell a place, and what tells of the place of a target that is known already.
-PLACED = ("position", "range-bearing", "pixel")
-ABLE = (*PLACED, "bearing")
 #: Looks, and places about the platform, by which it is found how much of the ground an image shows.
-MOST_LOOKS, PLACES = 50, 4000
+MOST_SCANS, PLACES = 50, 4000
 
 
 def _disc(count: int) -> Array:
@@ -371,15 +356,15 @@ class PlacedScans(NamedTuple):
     sensor, kind
         Its name, and what it detects.
     scans
-        N looks; ``sensor`` of each is ``order``.
+        N scans; ``sensor`` of each is ``order``.
     named
-        For each look the targets that its detections name: never told to the tracker.
+        For each scan the targets that its detections name: never given to the tracker.
     interval_s
         The usual time between two.
     without
-        How many detections have no place: rays that miss the ground, looks outside of the platform's log.
+        How many detections have no place: rays that miss the ground, scans outside of the platform's log.
     errors
-        What the detections of a look have in common, as ``shared`` of each look has it.
+        What the detections of a scan have in common, as ``shared`` of each scan has it.
     """
 
     sensor: str
@@ -404,12 +389,12 @@ class PlacedScans(NamedTuple):
         )
 
     def area(self, far: float) -> float:
-        """Square metres that one look covers: of all around as far as it sees, what its camera shows."""
+        """Square metres that one scan covers: of all around as far as it sees, what its camera shows."""
         disc = float(np.pi * far**2)
-        looked = [one for one in self.scans if one.sees is not None]
+        viewed = [one for one in self.scans if one.sees is not None]
         shares = [
             float(one.sees(one.platform + far * _DISC).mean())
-            for one in looked[:: max(len(looked) // MOST_LOOKS, 1)]
+            for one in viewed[:: max(len(viewed) // MOST_SCANS, 1)]
             if one.sees is not None
         ]
         return disc * max(float(np.median(shares)), 1 / len(_DISC)) if shares else disc
@@ -418,7 +403,7 @@ class PlacedScans(NamedTuple):
 def place_scans(
     flight: Flight, scans: Scans, beliefs: NoiseModel, order: int, source: str | None, lasting_s: float = 0.0
 ) -> PlacedScans:
-    """The looks of a sensor as places, what each is wrong by alone, and what they have in common.
+    """The scans of a sensor as places, what each is wrong by alone, and what they have in common.
 
     Parameters
     ----------
@@ -437,10 +422,10 @@ def place_scans(
     WildlabError
         Where its detections tell nothing of a place.
     """
-    if scans.kind not in ABLE:
+    if scans.kind not in PLACEABLE:
         raise WildlabError(
             f"the sensor {scans.sensor!r} detects {scans.kind!r}, which tells nothing of a place",
-            f"follow many targets by sensors that detect {', '.join(ABLE)}; name them with --sensor",
+            f"follow many targets by sensors that detect {', '.join(PLACEABLE)}; name them with --sensor",
             file=flight.folder,
             field="detections.kind",
         )
@@ -458,7 +443,7 @@ def place_scans(
     if scans.kind in ("position", "range-bearing"):
         shared, errors = errors_of_elements(scans, beliefs, z)
     usable = np.isfinite(scans.platform).all(axis=1)
-    looks, named, without = [], [], 0
+    placed, named, without = [], [], 0
     for row in np.flatnonzero(usable):
         there = np.isfinite(scans.detections[row]).all(axis=-1)
         good = there & np.isfinite(z[row]).all(axis=-1) & np.isfinite(R[row]).all(axis=(-2, -1))
@@ -466,14 +451,14 @@ def place_scans(
         without += int((there & ~good).sum())
         time, platform = float(scans.times[row]), scans.platform[row]
         sees, common = view_of(scans, int(row)), shared[row][good] if errors.names else None
-        looks.append(Scan(time, order, platform, z[row][good], R[row][good], sees, common))
+        placed.append(Scan(time, order, platform, z[row][good], R[row][good], sees, common))
         named.append(frozenset(str(one) for one in scans.labels[row] if one))
     without += int(np.isfinite(scans.detections[~usable]).all(axis=-1).sum())
-    return PlacedScans(scans.sensor, scans.kind, looks, named, scans.interval_s, without, errors)
+    return PlacedScans(scans.sensor, scans.kind, placed, named, scans.interval_s, without, errors)
 
 
 def thinned(places: PlacedScans, apart_s: float) -> PlacedScans:
-    """Only looks at least so far apart, see `wildlab.tracking.filters.thin`."""
+    """Only scans at least so far apart, see `wildlab.tracking.filters.thin`."""
     kept = np.flatnonzero(thin([scan.time for scan in places.scans], apart_s))
     return places._replace(
         scans=[places.scans[row] for row in kept], named=[places.named[row] for row in kept]
@@ -504,10 +489,10 @@ def _of_pixels(
 ) -> tuple[Array, Array, Array, CorrelatedErrors]:
     """Rays where they meet the ground, what each is wrong by alone, and what the poses do to all."""
     observed = observe(flight, source, clock_shift=beliefs.offset_s)
-    told = camera_errors(flight, observed, beliefs)
-    points = georeference(observed, np.random.default_rng(0), told)
-    of_pose = errors_of_poses(flight, observed, told, beliefs, lasting_s)
-    own, shared, errors = errors_of_pixels(observed, told, of_pose, covariances_of(points), lasting_s)
+    assumed = camera_errors(flight, observed, beliefs)
+    points = georeference(observed, np.random.default_rng(0), assumed)
+    of_pose = errors_of_poses(flight, observed, assumed, beliefs, lasting_s)
+    own, shared, errors = errors_of_pixels(observed, assumed, of_pose, covariances_of(points), lasting_s)
     ids = pd.Index(points["detection_id"])
     row = pd.Index(ids[~ids.duplicated()]).get_indexer(pd.Index(scans.ids.ravel()))
     row = np.where(row < 0, -1, np.flatnonzero(~ids.duplicated())[row])
@@ -519,7 +504,7 @@ def _of_pixels(
 
 
 def view_of(scans: Scans, row: int) -> Sees | None:
-    """What the image of a look shows of the plane that targets move on; None where it is of no camera."""
+    """What the image of a scan shows of the plane that targets move on; None where it is of no camera."""
     poses = scans.poses
     if poses is None:
         return None

@@ -12,7 +12,6 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.analysis.tracks.ground_positions import (
-    PLACED,
     UNKNOWN_EFFECT,
     PlacedScans,
     align_errors,
@@ -21,16 +20,20 @@ from wildlab.analysis.tracks.ground_positions import (
     pose_correlation_time,
     thinned,
 )
-from wildlab.analysis.tracks.inputs import read_inputs
-from wildlab.analysis.tracks.noise_model import ASSUMED, STATED, GivenValue
-from wildlab.analysis.tracks.noise_model import TargetModel as Following
-from wildlab.analysis.tracks.scans import truth_deviations, truths_at
+from wildlab.analysis.tracks.noise_model import ASSUMED, HERE, STATED, GivenValue, GivenValues, TargetModel
+from wildlab.analysis.tracks.scans import PLACED, truth_deviations, truths_at
 from wildlab.analysis.tracks.single_target import STATE
+from wildlab.analysis.tracks.tracker import read_inputs
 from wildlab.errors import WildlabError
 from wildlab.evaluation.identities import Identities, compare_identities
 from wildlab.evaluation.identities import Moment as Compared
 from wildlab.flight.store import Flight
-from wildlab.flight.tracking_settings import ManyTargetsPart, SensorPart, Settings, read_settings
+from wildlab.flight.tracking_settings import (
+    ManyTargetsPart,
+    SensorPart,
+    Settings,
+    read_settings,
+)
 from wildlab.geometry.frames import Array
 from wildlab.paths import DATA
 from wildlab.tracking.many import (
@@ -50,46 +53,44 @@ DETECTION = 0.8
 BEYOND = 1.05
 #: Even what detects nothing false in a flight might: so many times a scan at least.
 LEAST_FALSE = 0.02
-#: For how many usual looks, and how many seconds at least, a target is shown that is not seen.
-LOOKS_SHOWN, SECONDS_SHOWN = 4.0, 5.0
-#: Where a value is from that this flight's detections tell.
-HERE = "estimated here"
+#: For how many usual scans, and how many seconds at least, a target is shown that is not seen.
+SCANS_SHOWN, SECONDS_SHOWN = 4.0, 5.0
 
 _WORDS = {
     "lifetime_s": ("how long a target is about", " s"),
     "birth": ("probability that a detection of nothing known is a new target", ""),
-    "visible_s": ("how long a target is in sight at a time", " s"),
-    "hidden_s": ("how long it is out of sight", " s"),
+    "visible_s": ("time in sight", " s"),
+    "hidden_s": ("time out of sight", " s"),
     "gate": ("gate, in standard deviations", ""),
     "confirmed": ("probability of existence from which a track is believed", ""),
-    "hits": ("looks with a detection from which a track is believed", ""),
+    "hits": ("scans with a detection from which a track is believed", ""),
     "shown": ("probability of existence above which it is shown", ""),
     "forgotten": ("probability of existence below which a track ends", ""),
-    "lost_m": ("standard deviation of its place above which a track ends", " m"),
+    "lost_m": ("SD of its position above which a track ends", " m"),
     "fastest_m_s": ("speed that no target has", " m/s"),
     "moves_m": ("way after which a track is shown", " m"),
     "over_s": ("time within which it has to go that way", " s"),
-    "apart_m": ("distance within which two tracks that move alike are one", " m"),
+    "apart_m": ("distance within which tracks alike are one", " m"),
 }
 _HULLS = {
-    "rough_m": "which part of a hull is seen, SD of each axis, by kind",
+    "rough_m": "part of a hull that is seen, SD of each axis",
     "along_m": "the same along its heading",
-    "near_side_m": "how far on this side of its middle a hull is seen from its side, by kind",
-    "near_end_m": "the same of a hull that heads here or away, by kind",
+    "near_side_m": "distance of what is seen from a hull's middle, from its side",
+    "near_end_m": "the same from ahead or astern",
 }
 
 
 def model_jointly(
-    settings: Settings, following: Following, places: list[PlacedScans]
+    settings: Settings, single: TargetModel, places: list[PlacedScans]
 ) -> tuple[ManyTargetModel, list[ManySensorModel], list[GivenValue]]:
-    """What the tracker is told of the targets and of each sensor, and where each value is from.
+    """What the tracker is given of the targets and of each sensor, and where each value is from.
 
     Parameters
     ----------
     settings
         From `wildlab.analysis.tracks.noise_model.settings_of`.
-    following
-        What filters of one target are told of the targets.
+    single
+        What filters of one target are given of the targets.
     places
         Of every sensor.
 
@@ -100,127 +101,85 @@ def model_jointly(
     """
     refuse_unfit(settings)
     stated, usual = settings.targets.many or ManyTargetsPart(), _usual()
-    said: list[GivenValue] = []
-    told: dict[str, Any] = {}
-
-    def one(name: str) -> float:
-        own = getattr(stated, name)
-        value = float(getattr(usual, name) if own is None else own)
-        what, unit = _WORDS[name]
-        said.append(GivenValue("targets", what, f"{value:.3g}{unit}", ASSUMED if own is None else STATED))
-        return value
-
+    given = GivenValues("targets")
     hulls = tuple(
         Hull(part.name, part.length_m, part.beam_m, part.share) for part in stated.hulls or usual.hulls
     )
-    said.append(
-        GivenValue(
-            "targets",
-            "kinds by size",
-            ", ".join(f"{hull.name} {hull.length_m:g} m" if hull.length_m else hull.name for hull in hulls),
-            STATED if stated.hulls else ASSUMED,
-        )
-    )
-    for name in _WORDS:
-        told[name] = one(name)
-    told["hits"] = int(told["hits"])
-    targets = ManyTargetModel(hulls, following.density, following.start_speed_m_s, **told)
-    sensors = []
-    farthest = max((float(looks.distances().max(initial=0.0)) for looks in places), default=0.0)
-    for looks in places:
-        found, more = _of_sensor(settings, looks, len(hulls), farthest)
-        sensors.append(found)
-        said += more
-    return targets, sensors, said
+    sizes = ", ".join(f"{hull.name} {hull.length_m:g} m" if hull.length_m else hull.name for hull in hulls)
+    given.add("kinds by size", sizes, STATED if stated.hulls else ASSUMED)
+    values: dict[str, Any] = {
+        name: given.number(what, unit, getattr(stated, name), getattr(usual, name))
+        for name, (what, unit) in _WORDS.items()
+    }
+    values["hits"] = int(values["hits"])
+    targets = ManyTargetModel(hulls, single.density, single.start_speed_m_s, **values)
+    farthest = max((float(one.distances().max(initial=0.0)) for one in places), default=0.0)
+    each = [_of_sensor(settings, one, len(hulls), farthest) for one in places]
+    return targets, [one for one, _ in each], [*given.values, *(value for _, more in each for value in more)]
 
 
 def _of_sensor(
-    settings: Settings, looks: PlacedScans, kinds: int, farthest: float
+    settings: Settings, placed: PlacedScans, kinds: int, farthest: float
 ) -> tuple[ManySensorModel, list[GivenValue]]:
     """``farthest``: m, the farthest detection of any sensor, for one that knows no distances."""
-    part = settings.sensors.get(looks.sensor)
-    stated = None if part is None else part.many
-    said: list[GivenValue] = []
+    part = settings.sensors.get(placed.sensor, SensorPart())
+    stated = part.many
+    given = GivenValues(placed.sensor)
 
-    def one(name: str, what: str, unit: str, other: float, source: str) -> float:
-        own = None if stated is None else getattr(stated, name)
-        value = other if own is None else float(own)
-        said.append(GivenValue(looks.sensor, what, f"{value:.3g}{unit}", source if own is None else STATED))
-        return value
+    def one(name: str, what: str, unit: str, other: float, source: str = ASSUMED) -> float:
+        return given.number(what, unit, getattr(stated, name), other, source)
 
-    if looks.bearings and stated is not None and stated.several:
+    if placed.bearings and stated.several:
         raise WildlabError(
-            f"the sensor {looks.sensor!r} has bearings, and several of one hull cannot be told as one",
+            f"the sensor {placed.sensor!r} has bearings, and several of one hull are not merged",
             "leave out several",
-            field=f"sensors.{looks.sensor}.many.several",
+            field=f"sensors.{placed.sensor}.many.several",
         )
-    distance = looks.distances()
-    near = one("near_m", "distance below which it sees nothing", " m", 0.0, ASSUMED)
-    reach = farthest if looks.bearings else float(distance.max(initial=1.0))
+    distance = placed.distances()
+    near = one("near_m", "distance below which it sees nothing", " m", 0.0)
+    reach = farthest if placed.bearings else float(distance.max(initial=1.0))
     far = one("far_m", "distance above which it sees nothing", " m", BEYOND * reach, HERE)
     # What is left over if every scan had one target: a guess that is too high where there are many.
-    each = sum(len(look.z) for look in looks.scans) / max(len(looks.scans), 1)
-    over = 2 * np.pi if looks.bearings else looks.area(far)
-    clutter = max(each - 1.0, LEAST_FALSE) / over
+    each = sum(len(scan.z) for scan in placed.scans) / max(len(placed.scans), 1)
+    clutter = max(each - 1.0, LEAST_FALSE) / (2 * np.pi if placed.bearings else placed.area(far))
     if near >= far:
         raise WildlabError(
-            f"the sensor {looks.sensor!r} sees nothing nearer than {near:g} m or farther than {far:g} m",
-            "state near_m and far_m so that something lies between them",
-            field=f"sensors.{looks.sensor}.many",
+            f"the sensor {placed.sensor!r} sees nothing nearer than {near:g} m or farther than {far:g} m",
+            "state near_m below far_m",
+            field=f"sensors.{placed.sensor}.many",
         )
-    interval = looks.interval_s
-    hull_values = {name: getattr(stated, name, ()) or (0.0,) * kinds for name in _HULLS}
-    hull_values["near_end_m"] = getattr(stated, "near_end_m", ()) or hull_values["near_side_m"]
+    hull_values: dict[str, Any] = {name: getattr(stated, name) or (0.0,) * kinds for name in _HULLS}
+    hull_values["near_end_m"] = stated.near_end_m or hull_values["near_side_m"]
+    unit, area = ("rad", "within a radian") if placed.bearings else ("m2", "on a square metre")
+    shown_s = max(SCANS_SHOWN * placed.interval_s, SECONDS_SHOWN)
     found = ManySensorModel(
-        looks.sensor,
-        one("detection", "probability that what is in view is detected", "", DETECTION, ASSUMED),
-        one(
-            "clutter_per_rad" if looks.bearings else "clutter_per_m2",
-            f"false detections in a look {'within a radian' if looks.bearings else 'on a square metre'}",
-            "",
-            clutter,
-            HERE,
-        ),
+        placed.sensor,
+        one("detection", "probability that what is in view is detected", "", DETECTION),
+        one(f"clutter_per_{unit}", f"false detections in a scan {area}", "", clutter, HERE),
         near,
         far,
-        one(
-            "patience_s",
-            "how long a target is shown after it saw it last",
-            " s",
-            max(LOOKS_SHOWN * interval, SECONDS_SHOWN),
-            ASSUMED,
-        ),
-        hull_values["rough_m"],
-        hull_values["along_m"],
-        hull_values["near_side_m"],
-        bool(stated is not None and stated.several),
-        looks.bearings,
-        hull_values["near_end_m"],
+        one("patience_s", "time shown after it was last seen", " s", shown_s),
+        several=bool(stated.several),
+        bearings=placed.bearings,
+        **hull_values,
     )
-    if looks.kind in PLACED and looks.kind != "pixel":
+    if placed.kind in PLACED and placed.kind != "pixel":
         share, lasts = correlated_share(part)
         words = f"{share:.2g}, for {lasts:.3g} s" if share else "0"
-        source = ASSUMED if part is None or part.correlation is None else STATED
-        said.append(GivenValue(looks.sensor, "share of the errors' variance that lasts", words, source))
+        source = ASSUMED if part.correlation is None else STATED
+        given.add("share of the errors' variance that lasts", words, source)
         found = found._replace(correlation=share, lasting_s=lasts)
     for name, what in _HULLS.items():
-        own = stated is not None and bool(getattr(stated, name))
-        values = ", ".join(f"{value:.3g}" for value in hull_values[name])
-        said.append(GivenValue(looks.sensor, what, f"{values} m", STATED if own else ASSUMED))
-    said.append(
-        GivenValue(
-            looks.sensor,
-            "whether one hull may give several detections",
-            "yes" if found.several else "no",
-            STATED if stated is not None and stated.several is not None else ASSUMED,
-        )
-    )
-    return found, said
+        shown = ", ".join(f"{value:.3g}" for value in hull_values[name])
+        given.add(what, f"{shown} m", STATED if getattr(stated, name) else ASSUMED)
+    several = "whether one hull may give several detections"
+    given.add(several, "yes" if found.several else "no", ASSUMED if stated.several is None else STATED)
+    return found, given.values
 
 
-def correlated_share(part: SensorPart | None) -> tuple[float, float]:
+def correlated_share(part: SensorPart) -> tuple[float, float]:
     """Share of the variance of a sensor's errors that lasts, and for how long, s; zero where nobody says."""
-    if part is None or not part.correlation:
+    if not part.correlation:
         return 0.0, 0.0
     return part.correlation, part.correlation_time_s or np.inf
 
@@ -228,14 +187,14 @@ def correlated_share(part: SensorPart | None) -> tuple[float, float]:
 def unknown_correlation(settings: Settings, places: Mapping[str, PlacedScans]) -> list[str]:
     """Sensors of which nobody says how long their errors last.
 
-    It is said by ``correlation``, zero too, or considered errors; of a camera's pixels by
+    It is stated by ``correlation``, zero too, or considered errors; of a camera's pixels by
     ``correlation_time_s`` or considered errors, of bearings by ``thinning_s``.
     """
     found = []
     for name, one in places.items():
-        part = settings.sensors.get(name)
+        part = settings.sensors.get(name, SensorPart())
         key = {"pixel": "correlation_time_s", "bearing": "thinning_s"}.get(one.kind, "correlation")
-        if part is None or (getattr(part, key) is None and (one.bearings or not part.considered)):
+        if getattr(part, key) is None and (one.bearings or not part.considered):
             found.append(name)
     return found
 
@@ -246,7 +205,7 @@ def _usual() -> ManyTargetsPart:
 
 
 def refuse_unfit(settings: Settings) -> None:
-    """Refuse what can follow nothing: births that nothing survives, numbers for hulls that there are not.
+    """Refuse what can track nothing: births that nothing survives, numbers for hulls that there are not.
 
     Raises
     ------
@@ -254,12 +213,8 @@ def refuse_unfit(settings: Settings) -> None:
         Where a new target exists with no more than one that is given up, two kinds of hulls have one name, or
         a sensor has another number of values for the hulls than there are hulls.
     """
-    many = settings.targets.many
-    usual = _usual()
-    birth, forgotten = (
-        getattr(usual if many is None or getattr(many, name) is None else many, name)
-        for name in ("birth", "forgotten")
-    )
+    many, usual = settings.targets.many or ManyTargetsPart(), _usual()
+    birth, forgotten = many.birth or usual.birth or 0.0, many.forgotten or usual.forgotten or 0.0
     if birth <= forgotten:
         raise WildlabError(
             f"a new target exists with probability {birth:g}, and one that exists with {forgotten:g} or less "
@@ -267,13 +222,13 @@ def refuse_unfit(settings: Settings) -> None:
             "state a birth that is above forgotten",
             field="targets.many.birth",
         )
-    names = [hull.name for hull in many.hulls] if many is not None else []
+    names = [hull.name for hull in many.hulls]
     if twice := next((one for one in names if names.count(one) > 1), None):
         raise WildlabError(
             f"two kinds of hulls are called {twice!r}", "give each a name of its own",
             field="targets.many.hulls.name",
         )  # fmt: skip
-    kinds = max(len(many.hulls), 1) if many is not None else 1
+    kinds = max(len(names), 1)
     for sensor, part in settings.sensors.items():
         for name in _HULLS:
             own = getattr(part.many, name)
@@ -302,15 +257,15 @@ class ManyTracks(NamedTuple):
     places
         By sensor.
     sensors, targets
-        What the tracker was told.
+        What the tracker was given.
     truth
-        By target's name (N, 2), where it was at each look; NaN where that is not known. Empty without truth.
+        By target's name (N, 2), where it was at each scan; NaN where that is not known. Empty without truth.
     given
-        What the tracker was told, and who says so.
+        What the tracker was given, and who says so.
     notes
         What was done to the detections, in sentences.
     lasting_s
-        Of each error that the detections of a look share, for how long it lasts.
+        Of each error that the detections of a scan share, for how long it lasts.
     cutoff_m
         From this distance a track is on no target: what is believed of how near detections are.
     truth_sd
@@ -343,7 +298,7 @@ class ManyTracks(NamedTuple):
 
     @property
     def minutes(self) -> float:
-        """From the first look to the last."""
+        """From the first scan to the last."""
         return (self.scans[-1].time - self.scans[0].time) / 60 if len(self.scans) > 1 else 0.0
 
 
@@ -367,28 +322,27 @@ def track_jointly(
         As that, and where no detection tells a place.
     """
     inputs = read_inputs(flight, settings=settings, sensors=sensors, source=source, joint=True)
-    told = inputs.settings
-    said = [one for one in inputs.given if one.what.startswith(("acceleration", "speed"))]
+    stated = inputs.settings
+    given = [one for one in inputs.given if one.what.startswith(("acceleration", "speed"))]
     notes = list(inputs.notes)
     places: dict[str, PlacedScans] = {}
-    for name, (looks, belief, _, more) in inputs.sensors.items():
-        told_here, unused = _considered_apart(list(dict.fromkeys(more)), looks.kind)
-        said += told_here
-        if looks.kind == "pixel":
-            said += given_of_pixels(flight, looks, told.sensors.get(name))
+    for name, (scanned, belief, _, more) in inputs.sensors.items():
+        given_here, unused = _considered_apart(list(dict.fromkeys(more)), scanned.kind)
+        given += given_here
+        part = stated.sensors.get(name, SensorPart())
+        if scanned.kind == "pixel":
+            given += given_of_pixels(flight, scanned, part)
         if unused:
-            bearing = looks.kind == "bearing"
+            bearing = scanned.kind == "bearing"
             what = "Errors" if bearing else "An error of the clock"
             which = "that last are" if bearing else "is"
             notes.append(f"{what} of {name} {which} not considered where many targets are followed.")
-        found = place_scans(
-            flight, looks, belief, len(places), source, pose_correlation_time(told.sensors.get(name))
-        )
+        found = place_scans(flight, scanned, belief, len(places), source, pose_correlation_time(part))
         if found.bearings and np.isfinite(belief.thinning_s):
             kept = thinned(found, belief.thinning_s)
             if len(kept.scans) < len(found.scans):
                 notes.append(
-                    f"Of {len(found.scans)} looks of {name} {len(kept.scans)} are used, "
+                    f"Of {len(found.scans)} scans of {name} {len(kept.scans)} are used, "
                     f"{belief.thinning_s:.3g} s apart: errors of bearings last."
                 )
             found = kept
@@ -397,23 +351,23 @@ def track_jointly(
             notes.append(f"{found.without} detections of {name} have no place on the ground.")
     if all(one.bearings for one in places.values()):
         raise WildlabError(
-            "no sensor detects places: bearings alone begin no track",
-            "follow one target by its bearings: wildlab track without --many",
+            "bearings alone begin no track",
+            "leave --many out",
             file=flight.folder,
             field="detections.kind",
         )
-    targets, sensors_told, more_said = model_jointly(told, inputs.targets, list(places.values()))
+    targets, models, more_given = model_jointly(stated, inputs.targets, list(places.values()))
     lasting_s, shared = align_errors(
         [(one.errors, [scan.shared for scan in one.scans]) for one in places.values()]
     )
     pairs = [
         (scan._replace(shared=common) if len(common) else scan._replace(shared=None), names)
-        for one, looks_of in zip(places.values(), shared, strict=True)
-        for scan, names, common in zip(one.scans, one.named, looks_of, strict=True)
+        for one, scans_of_one in zip(places.values(), shared, strict=True)
+        for scan, names, common in zip(one.scans, one.named, scans_of_one, strict=True)
     ]
     pairs.sort(key=lambda pair: pair[0].time)
     scans = [scan for scan, _ in pairs]
-    shown = run_many(scans, sensors_told, targets, lasting_s)
+    shown = run_many(scans, models, targets, lasting_s)
     truth, truth_sd, estimated = dict[str, Array](), dict[str, float](), list[str]()
     if flight.truth is not None and len(flight.truth):
         known = truths_at(flight, [scan.time for scan in scans])
@@ -424,38 +378,38 @@ def track_jointly(
         [names for _, names in pairs],
         shown,
         places,
-        sensors_told,
+        models,
         targets,
         truth,
-        [*said, *more_said],
+        [*given, *more_given],
         notes,
         lasting_s,
         inputs.targets.reach_m if np.isfinite(inputs.targets.reach_m) else CUTOFF_M,
         truth_sd,
-        bool(told.targets.many is not None and told.targets.many.others),
-        unknown_correlation(told, places),
+        bool(stated.targets.many is not None and stated.targets.many.others),
+        unknown_correlation(stated, places),
         estimated,
     )
 
 
-def _considered_apart(said: list[GivenValue], kind: str) -> tuple[list[GivenValue], list[GivenValue]]:
-    """What a sensor of this kind is told, and which considered errors have no part in it.
+def _considered_apart(given: list[GivenValue], kind: str) -> tuple[list[GivenValue], list[GivenValue]]:
+    """What a sensor of this kind is given, and which considered errors have no part in it.
 
-    What [uncertainty] says of a camera's pose is said with all that pixels share, and is in neither.
+    What [uncertainty] says of a camera's pose is given with all that pixels share, and is in neither.
     """
-    considered = [one for one in said if one.what.startswith("considered")]
+    considered = [one for one in given if one.what.startswith("considered")]
     unused = [one for one in considered if kind == "bearing" or one.what.endswith(f": {UNKNOWN_EFFECT}")]
     elsewhere = [one for one in considered if kind == "pixel" and one.source != STATED]
-    return [one for one in said if one not in unused and one not in elsewhere], unused
+    return [one for one in given if one not in unused and one not in elsewhere], unused
 
 
 def known_scans(followed: ManyTracks) -> NDArray[np.bool_]:
-    """(N,) looks at which any target's true place is known: elsewhere nothing is judged."""
+    """(N,) scans at which any target's true place is known: elsewhere nothing is judged."""
     return np.asarray(_true_places(followed).any(axis=0))
 
 
 def complete_scans(followed: ManyTracks) -> NDArray[np.bool_]:
-    """(N,) looks at which every target's true place is known: elsewhere no track is false."""
+    """(N,) scans at which every target's true place is known: elsewhere no track is false."""
     return known_scans(followed) & _true_places(followed).all(axis=0) & (not followed.others)
 
 
@@ -468,7 +422,7 @@ def _true_places(followed: ManyTracks) -> NDArray[np.bool_]:
 def score_identities(
     followed: ManyTracks, reach: Mapping[str, float] | None = None, at: Sequence[str] = ()
 ) -> Identities | None:
-    """Tracks against the true targets at the looks of `known_scans`; None where there are none, or no truth.
+    """Tracks against the true targets at the scans of `known_scans`; None where there are none, or no truth.
 
     A target can be seen where a detection names it, and where it lies in the camera's view, or within reach
     of any of the sensors. One that cannot costs nothing, with a track or without. Where not every true place
@@ -479,7 +433,7 @@ def score_identities(
     reach
         Metres by target's name, in place of the sensors' own.
     at
-        Names of the sensors at whose looks it is judged; all where none is named.
+        Names of the sensors at whose scans it is judged; all where none is named.
     """
     known, complete = known_scans(followed), complete_scans(followed)
     if at:
@@ -518,12 +472,12 @@ def score_identities(
 
 
 def tracks_table(followed: ManyTracks) -> pd.DataFrame:
-    """Every track at every look at which it was shown.
+    """Every track at every scan at which it was shown.
 
     Returns
     -------
     DataFrame
-        ``time_s``, ``sensor`` of the look, ``track``; the state in metres and m/s in n, ``p_ij`` its
+        ``time_s``, ``sensor`` of the scan, ``track``; the state in metres and m/s in n, ``p_ij`` its
         covariance, the upper triangle; ``existence``; the probability of each kind of hull; and the place
         once the flight is over (`smooth_many`), ``smoothed_``. Its covariance is left out where nobody says
         of a sensor how long its errors last: an error that lasts is averaged by no smoother, which would take

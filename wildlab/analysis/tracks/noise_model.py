@@ -1,29 +1,37 @@
 """What a filter believes of a sensor and of targets: stated, tuned elsewhere, or assumed.
 
 Stated is what ``flight.toml`` or a settings file says. What nobody says is assumed: the noise of pixels and
-the errors of the platform from ``[uncertainty]``, other noise from how rough the detections are from one look
+the errors of the platform from ``[uncertainty]``, other noise from how rough the detections are from one scan
 to the next, targets from ``data/settings/usual.toml``.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from wildlab.analysis.georeference import assumed_deviations
-from wildlab.analysis.tracks.scans import SLOTS, Scans
+from wildlab.analysis.tracks.scans import SLOTS, Scans, Truth
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
-from wildlab.flight.tracking_settings import CONSIDERED, Settings, TargetsPart, read_settings, settings_over
+from wildlab.flight.tracking_settings import (
+    CONSIDERED,
+    SensorPart,
+    Settings,
+    TargetsPart,
+    read_settings,
+    settings_over,
+)
 from wildlab.geometry.attitude_uncertainty import level_axes
 from wildlab.geometry.frames import Array, wrap
 from wildlab.paths import DATA
+from wildlab.tracking.kalman import TOGETHER, Considered, consider_all
 from wildlab.tracking.motion import Motion, white_acceleration
-from wildlab.tracking.schmidt import TOGETHER, Considered
 from wildlab.tracking.sensors import POSE
 
 #: Of which noise each element of a measurement has its standard deviation, and in what the file has it.
@@ -32,16 +40,17 @@ NOISE_OF = {
     "elevation": "elevation_deg", "u": "pixel_px", "v": "pixel_px", "v_north": "velocity_m_s",
     "v_east": "velocity_m_s",
 }  # fmt: skip
-#: Parts of [uncertainty] that say how wrong a platform may be.
-_OF_PLATFORM = {
+#: Parts of [uncertainty] that say how wrong a platform may be, by the errors of `POSE`.
+OF_PLATFORM = {
     "platform_north": "position_horizontal_m",
     "platform_east": "position_horizontal_m",
     "platform_down": "position_vertical_m",
-    "tilt": "tilt_deg",
+    "roll": "tilt_deg",
+    "pitch": "tilt_deg",
     "heading": "heading_deg",
-}  # fmt: skip
-#: H 7.2.2: measurements further apart than this (s) are taken for independent; but the next look of a slow
-#: sensor is no gap, so it is one and a half looks at least.
+}
+#: H 7.2.2: measurements further apart than this (s) are taken for independent; but the next scan of a slow
+#: sensor is no gap, so it is one and a half scans at least.
 LONGEST_GAP_S, LONGEST_GAP_LOOKS = 1.0, 1.5
 
 _GATE, _PATIENCE = "probability that its own detection is let in", "a track ends without a detection for"
@@ -49,8 +58,10 @@ _REACH, _REACH_OF_RAYS = "a detection of its own is within", "a ray to it is wit
 #: What is not asked of targets that detections name.
 OF_UNNAMED = (_GATE, _PATIENCE, _REACH, _REACH_OF_RAYS)
 STATED, ASSUMED = "stated", "assumed"
-#: Of a noise that nobody states: it is estimated where it is judged, and the page says so.
-ROUGH = "estimated here: how rough its detections are"
+#: Where a value is from that this flight's detections say: it is estimated where it is judged, and the page
+#: says so; and of a noise that nobody states.
+HERE = "estimated here"
+ROUGH = f"{HERE}: how rough its detections are"
 
 
 #: Errors that last are put down to these together, each group with one standard deviation.
@@ -154,14 +165,14 @@ class NoiseModel(NamedTuple):
     white
         (m,) standard deviations by which the filters without considered errors go.
     noise
-        (m,) what is new at every look, beside errors that are considered.
+        (m,) what is new at every scan, beside errors that are considered.
     considered
         Errors of the platform, the clock and the range; empty where poses have their covariance.
     lasting
-        Share of the variance of the errors that successive looks have in common; None: what the considered
+        Share of the variance of the errors that successive scans have in common; None: what the considered
         errors make of it.
     fading
-        What is left of the lasting part from one look to the next.
+        What is left of the lasting part from one scan to the next.
     thinning_s
         How far apart detections are whose errors are new; NaN where that is not known.
     range_m, range_sd_m
@@ -222,6 +233,39 @@ class GivenValue(NamedTuple):
     source: str
 
 
+class GivenValues:
+    """What a filter is given of one subject, value by value as it is chosen."""
+
+    def __init__(self, subject: str) -> None:
+        self.subject, self.values = subject, list[GivenValue]()
+
+    def add(self, what: str, value: str, source: str) -> None:
+        """Note a value in words."""
+        self.values.append(GivenValue(self.subject, what, value, source))
+
+    def number(
+        self, what: str, unit: str, stated: float | None, other: float, source: str = ASSUMED
+    ) -> float:
+        """What is stated, else the other, which is from that source."""
+        value = float(other if stated is None else stated)
+        self.add(what, f"{value:.3g}{unit}", source if stated is None else STATED)
+        return value
+
+
+class SensorInputs(NamedTuple):
+    """One sensor: its scans, the model of its errors, targets that it may see, and where values are from."""
+
+    scans: Scans
+    noise: NoiseModel
+    truths: list[Truth]
+    given: Sequence[GivenValue] = ()
+
+    def split(self, target: str) -> tuple[Truth, list[Truth]]:
+        """A target's truth, and those of the others."""
+        mine = next(one for one in self.truths if one.target == target)
+        return mine, [one for one in self.truths if one.target != target]
+
+
 Against = Literal["truth", "innovations"]
 
 
@@ -238,7 +282,7 @@ class Tuned(NamedTuple):
     density: float | None = None
 
     def given_density(self) -> GivenValue:
-        """For the table of what filters were told."""
+        """For the table of what filters were given."""
         words = "acceleration, SD of the velocity that grows in a second"
         return GivenValue("targets", words, f"{self.density or 0.0:.3g} m/s", f"tuned on {self.flight}")
 
@@ -246,15 +290,11 @@ class Tuned(NamedTuple):
 def model_targets(stated: TargetsPart) -> tuple[TargetModel, list[GivenValue]]:
     """What is stated of the targets, else the usual."""
     usual = read_settings(DATA / "settings" / "usual.toml").targets
-    said = []
+    given = GivenValues("targets")
 
-    def one(name: str, words: str, unit: str) -> float:
+    def one(name: str, what: str, unit: str) -> float:
         own, other = getattr(stated, name), getattr(usual, name)
-        value = other if own is None else own
-        if value is None:
-            return float("nan")
-        said.append(GivenValue("targets", words, f"{value:.3g}{unit}", ASSUMED if own is None else STATED))
-        return float(value)
+        return float("nan") if own is other is None else given.number(what, unit, own, other)
 
     found = TargetModel(
         one("acceleration_m_s_sqrt_s", "acceleration, SD of the velocity that grows in a second", " m/s"),
@@ -266,7 +306,7 @@ def model_targets(stated: TargetsPart) -> tuple[TargetModel, list[GivenValue]]:
         one("size_m", "a track is with it within", " m"),
         stated.identified,
     )
-    return found, said
+    return found, given.values
 
 
 def settings_of(flight: Flight, stated: Settings | None = None) -> Settings:
@@ -321,22 +361,14 @@ def model_noise(
     WildlabError
         Where the noise is not stated and cannot be found.
     """
-    part = settings.sensors.get(scans.sensor)
-    said: list[GivenValue] = []
-
-    def tell(what: str, value: str, source: str) -> None:
-        said.append(GivenValue(scans.sensor, what, value, source))
-
+    part = settings.sensors.get(scans.sensor, SensorPart())
+    given = GivenValues(scans.sensor)
     found = None if tuned is None else noise_of_tuning(tuned)
     by_tuning = f"tuned on {tuned_on}"
     noise, sources = _noise(flight, scans, settings, found, by_tuning)
-    told = dict.fromkeys(
-        (_noise_words(name), _amount(name, float(noise[i])), sources[i])
-        for i, name in enumerate(scans.elements)
-    )
-    for one in told:
-        tell(*one)
-    stated_noise = part is not None and any(source == STATED for source in sources)
+    amounts = [_amount(name, float(sd)) for name, sd in zip(scans.elements, noise, strict=True)]
+    for one in dict.fromkeys(zip(map(_noise_words, scans.elements), amounts, sources, strict=True)):
+        given.add(*one)
     considered, source = _considered(flight, scans, settings, found, by_tuning)
     errors = {}
     for error in considered:
@@ -344,54 +376,47 @@ def model_noise(
         lasts = "constant" if np.isinf(error.correlation_time_s) else f"for {error.correlation_time_s:.3g} s"
         errors[name] = f"{_in_unit(error)}, {lasts}"
     for name, value in errors.items():
-        tell(f"considered error: {name}", value, source)
-    offset = part.clock_offset_s if part is not None else 0.0
-    stated_clock = part is not None and "clock_offset_s" in part.model_fields_set
-    if tuned is not None and tuned.clock_tuned and not stated_clock:
-        offset = tuned.offset_s
-        tell("to be added to its stamps", f"{offset:.2f} s", by_tuning)
-    elif stated_clock:
-        tell("to be added to its stamps", f"{offset:.2f} s", STATED)
+        given.add(f"considered error: {name}", value, source)
+    offset, source = part.clock_offset_s, STATED
+    if tuned is not None and tuned.clock_tuned and "clock_offset_s" not in part.model_fields_set:
+        offset, source = tuned.offset_s, by_tuning
+    if source != STATED or "clock_offset_s" in part.model_fields_set:
+        given.add("to be added to its stamps", f"{offset:.2f} s", source)
     base = found or NoiseModel(
         scans.sensor, scans.kind, 0.0, noise, noise, (), None, 1.0,
         float("nan"), float("nan"), float("nan"), scans.interval_s,
     )  # fmt: skip
-    interval = base.interval_s if part is None or part.rate_hz is None else 1 / part.rate_hz
-    fading, lasting, thinning = base.fading, base.lasting, base.thinning_s
-    times = [one.correlation_time_s for one in considered]
-    if found is None and times:
-        fading = float(np.exp(-interval / min(times)))
-        thinning = min(times) if np.isfinite(min(times)) else thinning
-    if part is not None:
-        if part.correlation_time_s is not None:
-            fading = float(np.exp(-interval / part.correlation_time_s))
-            thinning = part.correlation_time_s
-        lasting = lasting if part.correlation is None else part.correlation
-        thinning = thinning if part.thinning_s is None else part.thinning_s
+    interval = base.interval_s if part.rate_hz is None else 1 / part.rate_hz
+    fading, thinning = base.fading, base.thinning_s
+    if part.correlation_time_s is not None:
+        fading, thinning = float(np.exp(-interval / part.correlation_time_s)), part.correlation_time_s
+    elif found is None and considered:
+        shortest = min(one.correlation_time_s for one in considered)
+        fading = float(np.exp(-interval / shortest))
+        thinning = shortest if np.isfinite(shortest) else thinning
+    names = ("range_m", "range_sd_m", "thinning_s")
+    stated: dict[str, Any] = {"lasting": part.correlation} | {name: getattr(part, name) for name in names}
     beliefs = base._replace(
         offset_s=offset,
-        white=noise if found is None or stated_noise else found.white,
+        white=noise if found is None or STATED in sources else found.white,
         noise=noise,
         considered=considered,
-        lasting=lasting,
         fading=fading,
         thinning_s=thinning,
-        range_m=base.range_m if part is None or part.range_m is None else part.range_m,
-        range_sd_m=base.range_sd_m if part is None or part.range_sd_m is None else part.range_sd_m,
         interval_s=interval,
-    )
-    return beliefs, said
+    )._replace(**{name: value for name, value in stated.items() if value is not None})
+    return beliefs, given.values
 
 
 def _noise(
     flight: Flight, scans: Scans, settings: Settings, found: NoiseModel | None, by_tuning: str
 ) -> tuple[Array, list[str]]:
-    """(m,) standard deviations of what is new at each look, and where each is from."""
-    part = settings.sensors.get(scans.sensor)
+    """(m,) standard deviations of what is new at each scan, and where each is from."""
+    part = settings.sensors.get(scans.sensor, SensorPart())
     values, sources = np.full(len(scans.elements), np.nan), [""] * len(scans.elements)
     rough: Array | None = None
     for i, name in enumerate(scans.elements):
-        stated = None if part is None else getattr(part.noise, NOISE_OF[name])
+        stated = getattr(part.noise, NOISE_OF[name])
         if stated is not None:
             values[i], sources[i] = np.radians(stated) if NOISE_OF[name].endswith("deg") else stated, STATED
         elif found is not None:
@@ -422,8 +447,8 @@ def _noise(
 def _considered(
     flight: Flight, scans: Scans, settings: Settings, found: NoiseModel | None, by_tuning: str
 ) -> tuple[tuple[ConsideredError, ...], str]:
-    part = settings.sensors.get(scans.sensor)
-    if part is not None and part.considered:
+    part = settings.sensors.get(scans.sensor, SensorPart())
+    if part.considered:
         stated = []
         for name, one in part.considered.items():
             if not _considers(scans, name):
@@ -443,14 +468,16 @@ def _considered(
         return found.considered, by_tuning
     if scans.poses is not None and scans.poses.covariance is not None:
         return (), ""
-    errors = []
-    for name, key in _OF_PLATFORM.items():
-        if not _considers(scans, name):
-            continue
-        assumed = getattr(flight.manifest.uncertainty, key)
-        if assumed is not None:
-            sd = float(np.radians(assumed)) if key.endswith("deg") else float(assumed)
-            errors += [ConsideredError(each, sd, np.inf, True) for each in errors_named(name)]
+    stated_sds = {
+        name: (getattr(flight.manifest.uncertainty, key), key.endswith("deg"))
+        for name, key in OF_PLATFORM.items()
+        if name in SLOTS[scans.kind]
+    }
+    errors = [
+        ConsideredError(name, float(np.radians(sd) if degrees else sd), np.inf, True)
+        for name, (sd, degrees) in stated_sds.items()
+        if sd is not None
+    ]
     return tuple(errors), "[uncertainty] of flight.toml"
 
 
@@ -483,36 +510,22 @@ def _in_unit(error: ConsideredError) -> str:
 
 def errors_of(scans: Scans, beliefs: NoiseModel) -> Considered | None:
     """Those considered; of poses that have a covariance, that and what is considered beside it."""
-    names, blocks, times, shared = [], [], [], []
-    poses = scans.poses
-    own = poses is not None and poses.covariance is not None and bool(np.isfinite(poses.covariance).any())
-    n = len(scans.times)
-    if own and poses is not None:
-        names += list(POSE)
+    poses, n = scans.poses, len(scans.times)
+    of_pose = [one for one in beliefs.considered if one.name in POSE]
+    parts = list[Considered]()
+    if poses is not None and poses.covariance is not None and np.isfinite(poses.covariance).any():
         turn = np.tile(np.eye(6), (n, 1, 1))
         turn[:, 3:, 3:] = level_axes(poses.R_nb)
-        blocks.append(np.swapaxes(turn, 1, 2) @ np.asarray(poses.covariance, float) @ turn)
-        times += [np.inf] * len(POSE)
-        shared += [True] * len(POSE)
-    for one in beliefs.considered:
-        if own and one.name in POSE:
-            # What is stated comes on top of what the poses say of themselves.
-            i = POSE.index(one.name)
-            blocks[0][:, i, i] += one.sd**2
-            continue
-        names.append(one.name)
-        blocks.append(np.full((n, 1, 1), one.sd**2))
-        times.append(one.correlation_time_s)
-        shared.append(one.shared)
-    if not names:
-        return None
-    covariance = np.zeros((n, len(names), len(names)))
-    first = 0
-    for block in blocks:
-        last = first + block.shape[-1]
-        covariance[:, first:last, first:last] = block
-        first = last
-    return Considered(tuple(names), covariance, tuple(times), tuple(shared))
+        covariance = np.swapaxes(turn, 1, 2) @ np.asarray(poses.covariance, float) @ turn
+        for one in of_pose:  # what is stated comes on top of what the poses say of themselves
+            covariance[:, POSE.index(one.name), POSE.index(one.name)] += one.sd**2
+        parts.append(Considered(POSE, covariance))
+    parts += [
+        Considered((one.name,), np.full((n, 1, 1), one.sd**2), one.correlation_time_s, (one.shared,))
+        for one in beliefs.considered
+        if not parts or one not in of_pose
+    ]
+    return consider_all(*parts) if parts else None
 
 
 def spread_of(scans: Scans, beliefs: NoiseModel, H_pose: Array) -> Array | None:
@@ -532,7 +545,7 @@ QUARTER_OF_NORMAL = 0.3186393639643751
 NEIGHBOURS = 1.5
 #: A triple that is so many standard deviations off the line is of no target.
 FAR_OFF = 4.0
-#: By so much each look is turned more than the last to see what chance makes of it, rad: no turn comes back.
+#: By so much each scan is turned more than the last to see what chance makes of it, rad: no turn comes back.
 TURN = np.pi * (3 - np.sqrt(5))
 #: What is of targets lies nearer to a line than so many times what chance makes.
 NEARER = 0.5
@@ -541,10 +554,10 @@ NEARER = 0.5
 def roughness(scans: Scans) -> Array:
     """(m,) standard deviation of white noise that would make detections as rough as they are.
 
-    Of three successive looks, the middle one less the mean of the others, of the same label, or without
-    labels of detections that are nearest to each other from look to look; by the median, which a few wrong
-    ones do not move. What bends in the way of a target between looks counts as noise, what lasts does not.
-    NaN where there are no three looks in a row, or
+    Of three successive scans, the middle one less the mean of the others, of the same label, or without
+    labels of detections that are nearest to each other from scan to scan; by the median, which a few wrong
+    ones do not move. What bends in the way of a target between scans counts as noise, what lasts does not.
+    NaN where there are no three scans in a row, or
     nothing in them lies better in line than chance makes it.
     """
     if not scans.labelled:
@@ -565,9 +578,9 @@ def _spread(values: Array) -> Array:
 def _unnamed(scans: Scans) -> Array:
     """`roughness` where nobody says which detections are of one target, and some may be of none.
 
-    Two of successive looks go together where each is the other's nearest. Triples of clutter lie much farther
+    Two of successive scans go together where each is the other's nearest. Triples of clutter lie much farther
     off the line than those of a target: they are left out by and by, until none is beyond `FAR_OFF`. What is
-    left must lie nearer to a line than the same detections do when every look is turned by another angle,
+    left must lie nearer to a line than the same detections do when every scan is turned by another angle,
     where nothing is of one target any more: else it is clutter itself, and NaN.
     """
     nothing = np.full(scans.detections.shape[-1], np.nan)
@@ -590,8 +603,8 @@ def _unnamed(scans: Scans) -> Array:
 
 
 def _triples(scans: Scans, turn: float) -> tuple[Array, Array]:
-    """(N, m) of three looks' detections that go together the middle one less the mean of the others, and (N,)
-    how far that is where they are compared. Each look is turned by ``turn`` (rad) more than the last."""
+    """(N, m) of three scans' detections that go together the middle one less the mean of the others, and (N,)
+    how far that is where they are compared. Each scan is turned by ``turn`` (rad) more than the last."""
     gap = NEIGHBOURS * scans.interval_s
     values = [np.zeros((0, scans.detections.shape[-1]))]
     off = [np.zeros(0)]
@@ -604,7 +617,7 @@ def _triples(scans: Scans, turn: float) -> tuple[Array, Array]:
         if before and time - before[-1][0] > gap:
             before = []
         before = [*before[-2:], (float(time), here, _metric(scans, here, row, row * turn))]
-        # Of each detection of this look, the one of the look before that it goes together with, or -1.
+        # Of each detection of this scan, the one of the scan before that it goes together with, or -1.
         own = _mutual(before[-2][2], before[-1][2]) if len(before) > 1 else np.full(len(here), -1)
         if len(before) == 3 and before[2][0] > before[0][0]:
             (t0, z0, x0), (t1, z1, x1), (t2, z2, x2) = before
@@ -623,7 +636,7 @@ def _triples(scans: Scans, turn: float) -> tuple[Array, Array]:
 
 
 def _metric(scans: Scans, z: Array, row: int, turn: float) -> Array:
-    """Detections of a look where they may be compared, turned by an angle: ranges and bearings as places,
+    """Detections of a scan where they may be compared, turned by an angle: ranges and bearings as places,
     bearings on a circle."""
     if scans.kind == "bearing":
         azimuth = z[:, 0] + turn
@@ -637,7 +650,7 @@ def _metric(scans: Scans, z: Array, row: int, turn: float) -> Array:
 
 
 def _mutual(before: Array, here: Array) -> NDArray[np.intp]:
-    """(M,) of each detection of a look its nearest of the look before, where it is that one's nearest too."""
+    """(M,) of each detection of a scan its nearest of the scan before, where it is that one's nearest too."""
     back = np.asarray(cKDTree(before).query(here)[1], np.intp)
     forth = np.asarray(cKDTree(here).query(before)[1], np.intp)
     return np.where(forth[back] == np.arange(len(here)), back, -1)

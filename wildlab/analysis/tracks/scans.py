@@ -36,6 +36,9 @@ KINDS: dict[str, dict[str, str]] = {
     "pixel": {"u": "u_px", "v": "v_px"},
     "velocity": {"v_north": "v_north_m_s", "v_east": "v_east_m_s"},
 }
+#: Kinds of detections that say a place, and what says something of the place of a target that is known.
+PLACED = ("position", "range-bearing", "pixel")
+PLACEABLE = (*PLACED, "bearing")
 #: Elements whose differences are wrapped.
 ANGLES = ("azimuth", "elevation")
 _VELOCITY_COVARIANCE = ("v_cov_nn", "v_cov_ne", "v_cov_ee")
@@ -44,7 +47,7 @@ OVER_S = 1.0
 
 
 class Scans(NamedTuple):
-    """N looks of a sensor with up to K detections each, in order of time.
+    """N scans of a sensor with up to K detections each, in order of time.
 
     Attributes
     ----------
@@ -85,7 +88,7 @@ class Scans(NamedTuple):
 
     @property
     def interval_s(self) -> float:
-        """The usual time between two looks."""
+        """The usual time between two scans."""
         return float(np.median(np.diff(self.times))) if len(self.times) > 1 else 0.0
 
     @property
@@ -118,9 +121,9 @@ class Truth(NamedTuple):
 
 
 def sensors_of(flight: Flight) -> list[str]:
-    """The sensors that looked, in the order of their first look.
+    """The sensors that looked, in the order of their first scan.
 
-    Where the frames name no sensor, each source of detections is one, and every frame is a look of it.
+    Where the frames name no sensor, each source of detections is one, and every frame is a scan of it.
 
     Raises
     ------
@@ -135,7 +138,7 @@ def sensors_of(flight: Flight) -> list[str]:
     if not found:
         raise WildlabError(
             "there are no detections, and no frame says which sensor looked",
-            "name the sensor for every frame, also for those that saw nothing, or add detections",
+            "name every frame's sensor, or add detections",
             file=flight.folder,
             field="frames.sensor",
         )
@@ -143,7 +146,7 @@ def sensors_of(flight: Flight) -> list[str]:
 
 
 def scans_of(flight: Flight, sensor: str, offset_s: float = 0.0, source: str | None = None) -> Scans:
-    """The looks of a sensor, its detections those of the source of that name, in order of time.
+    """The scans of a sensor, its detections those of the source of that name, in order of time.
 
     Parameters
     ----------
@@ -158,7 +161,7 @@ def scans_of(flight: Flight, sensor: str, offset_s: float = 0.0, source: str | N
     ------
     WildlabError
         Where there is no such sensor, it detects nothing or things of several kinds, its detections are in
-        looks of another one, or the flight has no poses.
+        scans of another one, or the flight has no poses.
     """
     known = sensors_of(flight)
     if sensor not in known:
@@ -167,10 +170,10 @@ def scans_of(flight: Flight, sensor: str, offset_s: float = 0.0, source: str | N
         )
     frames = flight.table("frames")
     logged = frame_times(flight)
-    looked = np.isfinite(logged)
+    mine = np.isfinite(logged)
     if "sensor" in frames:
-        looked &= (frames["sensor"] == sensor).to_numpy()
-    chosen = np.flatnonzero(looked)
+        mine &= (frames["sensor"] == sensor).to_numpy()
+    chosen = np.flatnonzero(mine)
     chosen = chosen[np.argsort(logged[chosen], kind="stable")]
     frame_ids, stamps = frames["frame_id"].iloc[chosen], logged[chosen]
     seen = flight.table("detections")
@@ -198,7 +201,7 @@ def scans_of(flight: Flight, sensor: str, offset_s: float = 0.0, source: str | N
     if len(kinds) != 1:
         raise WildlabError(
             f"the sensor {sensor!r} detects {' and '.join(kinds) or 'nothing'}",
-            f"a target can be followed by detections of one kind: {' or '.join(KINDS)}",
+            f"use detections of one kind: {' or '.join(KINDS)}",
             file=flight.folder,
             field="detections.kind",
         )
@@ -307,7 +310,7 @@ def _camera_plane(
 
 
 def _filled(stated: Array, row: NDArray[np.intp], n: int) -> Array:
-    """(N,) the value of each look, between those that have one as time goes by; NaN where there is none."""
+    """(N,) the value of each scan, between those that have one as time goes by; NaN where there is none."""
     known = np.isfinite(stated)
     if not known.any():
         return np.full(n, np.nan)
@@ -388,18 +391,12 @@ def sensor_of(scans: Scans, drift: ArrayLike) -> Sensor:
     def predict(row: int, state: Array) -> Prediction:
         return _predict(scans, row, state[..., :2], state[..., 2:4], moves[row])
 
-    def ray(row: int, z: Array) -> tuple[Array, Array]:
-        azimuth = z[scans.elements.index("azimuth")]
-        return np.append(scans.platform[row], 0.0), np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
-
     return Sensor(
         predict,
         scans.angles,
         len(scans.times),
         4 if scans.kind == "velocity" else 2,
-        scans.elements,
         SLOTS[scans.kind],
-        ray if "azimuth" in scans.elements else None,
     )
 
 

@@ -84,13 +84,13 @@ def score_tracks(followed: TrackingResult) -> pd.DataFrame:
     """One row for each track.
 
     ``sensor``, ``kind``, ``target``, ``filter``; ``detections`` used after the start, and ``used`` with it;
-    ``rmse`` and ``mae`` beside the truth, of ``compared`` looks at which the target was seen, and
+    ``rmse`` and ``mae`` beside the truth, of ``compared`` scans at which the target was seen, and
     ``rmse_without`` of the ``without`` others; of those seen: ``nees`` with ``nees_low``, ``nees_high`` and
-    ``nees_worth`` independent values, its ``verdict``; ``inside``, the share of looks in the band of single
+    ``nees_worth`` independent values, its ``verdict``; ``inside``, the share of scans in the band of single
     values, with ``inside_low``, ``inside_high``; the same of ``nis``, its degrees of freedom ``dof`` and
     ``nis_verdict``; ``lag1``: the largest autocorrelation of an element of the whitened innovations from one
-    detection to the next; ``followed``: the share of looks with truth that have a track; ``restarts``: how
-    often a track ended and another started, and ``untracked``: looks without a track, of ``spanned`` from the
+    detection to the next; ``followed``: the share of scans with truth that have a track; ``restarts``: how
+    often a track ended and another started, and ``untracked``: scans without a track, of ``spanned`` from the
     first start to the end of the last, ``untracked_in_view`` of them with the target in sight.
     """
     return pd.DataFrame([score_track(one, kind_of(followed, one.sensor)) for one in followed.tracks])
@@ -135,14 +135,14 @@ def kind_of(followed: TrackingResult, sensor: str) -> str:
 
 def score_track(one: SensorTrack, kind: str) -> dict[str, object]:
     """A row of `score_tracks`, of a track by a sensor that detects what the kind says."""
-    looked, used = seen_of(one), used_of(one)
-    summary = summarise_track(track_errors((one.estimate + one.error)[looked], one.estimate[looked]))
-    away = np.hypot(*one.error[~looked, :2].T)
+    seen, used = seen_of(one), used_of(one)
+    summary = summarise_track(track_errors((one.estimate + one.error)[seen], one.estimate[seen]))
+    away = np.hypot(*one.error[~seen, :2].T)
     away = away[np.isfinite(away)]
-    m, squares = one.dof, one.nees[looked]
+    m, squares = one.dof, one.nees[seen]
     of_nees, of_nis = mean_of(squares, 2), mean_of(one.nis, m)
     if of_nees.n:
-        independent = worth_of_errors(one.error[looked, :2], one.covariance[looked, :2, :2])
+        independent = worth_of_errors(one.error[seen, :2], one.covariance[seen, :2, :2])
         of_nees = average(squares, 2, min(of_nees.worth, independent))
     inside = share_inside(squares, chi_square_interval(2))
     band = (np.nan, np.nan)
@@ -160,7 +160,7 @@ def score_track(one: SensorTrack, kind: str) -> dict[str, object]:
         "restarts": max(len(one.starts) - 1, 0),
         "untracked": int(one.without.sum()),
         "spanned": int(one.last - one.starts[0]) if len(one.starts) else 0,
-        "untracked_in_view": int((one.without & looked).sum()),
+        "untracked_in_view": int((one.without & seen).sum()),
         "compared": of_nees.n,
         "rmse": summary.rmse,
         "without": len(away),
@@ -188,12 +188,12 @@ def score_track(one: SensorTrack, kind: str) -> dict[str, object]:
 
 
 def used_of(one: SensorTrack) -> NDArray[np.bool_]:
-    """(N,) looks whose detection a track took, that of its start among them."""
+    """(N,) scans whose detection a track took, that of its start among them."""
     return np.isfinite(one.nis) | (one.detection != "" if len(one.detection) else False)
 
 
 def seen_of(one: SensorTrack) -> NDArray[np.bool_]:
-    """(N,) looks at which the target was seen, whether or not its track took the detection."""
+    """(N,) scans at which the target was seen, whether or not its track took the detection."""
     return one.near | used_of(one)
 
 
@@ -201,14 +201,14 @@ def whitened(one: SensorTrack) -> Array:
     """(K, m) innovations of the detections used, each in units of its own standard deviation."""
     used = np.isfinite(one.nis)
     if len(one.sizes):
-        return np.empty((0, 0))  # looks of several sensors have no elements in common
+        return np.empty((0, 0))  # scans of several sensors have no elements in common
     return np.asarray(whiten(one.innovation[used], one.S[used])) if used.any() else one.innovation[used]
 
 
 class SensorPair(NamedTuple):
     """Two sensors' tracks of one target by one filter: how far apart, and how far they say they may be.
 
-    ``rms`` m over ``n`` looks; ``squares``: the mean of the squared distance in units of both covariances,
+    ``rms`` m over ``n`` scans; ``squares``: the mean of the squared distance in units of both covariances,
     two where both are right and their errors have nothing to do with each other.
     """
 
@@ -222,7 +222,7 @@ class SensorPair(NamedTuple):
 
 
 def compare_sensors(followed: TrackingResult) -> list[SensorPair]:
-    """Every two sensors that follow the same target by the same filter, at the looks of the first."""
+    """Every two sensors that follow the same target by the same filter, at the scans of the first."""
     found = []
     groups: dict[tuple[str, str], list[SensorTrack]] = {}
     for track in followed.tracks:
@@ -251,7 +251,7 @@ def is_at_rest(one: SensorTrack) -> bool:
 
 
 def _between(one: SensorTrack, times: Array, density: float) -> tuple[Array, Array]:
-    """Position (N, 2) and its covariance at other times: carried on from the look before, and the
+    """Position (N, 2) and its covariance at other times: carried on from the scan before, and the
     less certain the longer, as the filters believe."""
     row = np.searchsorted(one.times, times, side="right") - 1
     there = row >= 0
@@ -280,7 +280,7 @@ COLUMNS = (
 
 
 def estimates_table(tracks: Sequence[SensorTrack], scans: dict[str, Scans]) -> pd.DataFrame:
-    """Every look at which a track was under way.
+    """Every scan at which a track was under way.
 
     Parameters
     ----------
@@ -315,7 +315,7 @@ def _of(one: SensorTrack, scans: dict[str, Scans]) -> pd.DataFrame:
     for i in range(4):
         columns |= {f"p_{i}{j}": one.covariance[rows, i, j] for j in range(i, 4)}
     columns["detection"] = one.detection[rows]
-    if one.sensor not in scans:  # of several sensors: each look has the elements of its own
+    if one.sensor not in scans:  # of several sensors: each scan has the elements of its own
         names = tuple(str(i) for i in range(one.innovation.shape[1]))
         columns |= {f"innovation_{name}": one.innovation[rows, i] for i, name in enumerate(names)}
     else:

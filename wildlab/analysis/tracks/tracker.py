@@ -1,9 +1,9 @@
 """The tracker: targets of a flight through all of its sensors, as `wildlab track` and `wildlab.track` call
 it.
 
-What depends on a flight is read once (`wildlab.analysis.tracks.inputs`). Identity is known or the nearest in
-the gate is taken: each target has tracks of its own, by each sensor and by all together, through several
-filters. `wildlab.analysis.tracks.many` follows all targets at once instead.
+What depends on a flight is read once (`read_inputs`). Identity is known or the nearest in the gate is taken:
+each target has tracks of its own, by each sensor and by all together, through several filters.
+`wildlab.analysis.tracks.many` tracks all targets at once instead.
 """
 
 from __future__ import annotations
@@ -13,16 +13,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wildlab.analysis.tracks.inputs import UNNAMED, names_of, read_inputs
 from wildlab.analysis.tracks.noise_model import (
     OF_UNNAMED,
     STATED,
     GivenValue,
     NoiseModel,
+    SensorInputs,
     TargetModel,
     Tuned,
+    model_noise,
+    model_targets,
+    settings_of,
 )
-from wildlab.analysis.tracks.scans import Scans
+from wildlab.analysis.tracks.scans import PLACEABLE, Scans, Truth, scans_of, sensors_of, truths_at
 from wildlab.analysis.tracks.single_target import (
     NAMES,
     SMOOTHABLE,
@@ -32,13 +35,183 @@ from wildlab.analysis.tracks.single_target import (
     track_target,
 )
 from wildlab.errors import WildlabError
+from wildlab.flight.checks.sensors import looks_of_others
 from wildlab.flight.store import Flight
-from wildlab.flight.tracking_settings import Settings
+from wildlab.flight.tracking_settings import Settings, absent_sensors
 
+#: What a target is called of which nobody says a name.
+UNNAMED = "target"
 #: The filter without anything but white noise, which the others are held against.
 WHITE = "ekf"
-#: Filters that take looks of several sensors.
+#: Filters that take scans of several sensors.
 ABLE = ("ekf", "ukf", "imm", "schmidt")
+
+
+class TrackingInputs(NamedTuple):
+    """What trackers take of a flight.
+
+    Attributes
+    ----------
+    sensors
+        By name.
+    settings
+        As stated, else as the flight has it.
+    targets
+        What is believed of them.
+    given
+        What filters are given of the targets, and who says so.
+    notes
+        What was done to the measurements, in sentences.
+    """
+
+    sensors: dict[str, SensorInputs]
+    settings: Settings
+    targets: TargetModel
+    given: list[GivenValue]
+    notes: list[str]
+
+
+def read_inputs(
+    flight: Flight,
+    *,
+    settings: Settings | None = None,
+    tuned: Tuned | None = None,
+    sensors: Sequence[str] = (),
+    source: str | None = None,
+    joint: bool = False,
+) -> TrackingInputs:
+    """Read what a tracker takes of a flight; arguments as of `wildlab.analysis.tracks.tracker.track`.
+
+    ``joint``: for all targets at once, whatever detections name.
+
+    Raises
+    ------
+    WildlabError
+        Where there is no such sensor, no detection, no time, or noise nobody knows.
+    """
+    refuse_without_times(flight)
+    stated = settings_of(flight, settings)
+    targets, given = model_targets(stated.targets)
+    if tuned is not None and tuned.density is not None and stated.targets.acceleration_m_s_sqrt_s is None:
+        targets = targets._replace(density=tuned.density)
+        given = [one for one in given if not one.what.startswith("acceleration")]
+        given.insert(0, tuned.given_density())
+    notes = [*_notes_of_absent(flight, stated), *_notes_of_sources(flight)]
+    found: dict[str, SensorInputs] = {}
+    for name in sensors_with_detections(flight, sensors):
+        scans = scans_of(flight, name, 0.0, source)
+        if joint and scans.kind not in PLACEABLE and not sensors:
+            notes.append(f"{name} was left out: what it detects ({scans.kind}) tells nothing of a place.")
+            continue
+        there, on = (None, "") if tuned is None else (tuned.sensors.get(name), tuned.flight)
+        noise, more = model_noise(flight, scans, stated, there, on)
+        if noise.offset_s:
+            scans = scans_of(flight, name, noise.offset_s, source)
+        scans = scans if joint else _identified(scans, targets)
+        found[name] = SensorInputs(scans, noise, _targets_of(flight, scans), more)
+    return TrackingInputs(found, stated, targets, given, notes)
+
+
+def refuse_without_times(flight: Flight) -> None:
+    """Refuse a flight whose photos carry no time.
+
+    Raises
+    ------
+    WildlabError
+        Of such a flight.
+    """
+    if flight.manifest.time.kind != "utc":
+        raise WildlabError(
+            "the photos carry no time",
+            "import the flight with times",
+            file=flight.folder,
+            field="time.kind",
+        )
+
+
+def _notes_of_absent(flight: Flight, stated: Settings) -> list[str]:
+    """A sentence for each sensor that the settings speak of and the flight does not have."""
+    absent = absent_sensors(stated, sensors_of(flight))
+    return [
+        f"The settings speak of a sensor {name!r}, which this flight does not have; {meant}."
+        for name, meant in absent.items()
+    ]
+
+
+def _notes_of_sources(flight: Flight) -> list[str]:
+    """A sentence for each source whose detections are of no sensor: these are not used."""
+    frames, seen = flight.frames, flight.detections
+    if frames is None or seen is None:
+        return []
+    others = looks_of_others(frames, seen)
+    strange = others[~others["source"].isin(sensors_of(flight))]
+    return [
+        f"{len(rows)} detections of the source {str(source)!r} are in looks of "
+        f"{f'the sensor {str(sensor)!r}' if sensor else 'no sensor'} and are not used: detections are a "
+        "sensor's where their source has its name."
+        for (source, sensor), rows in strange.groupby(["source", "sensor"], sort=True)
+    ]
+
+
+def sensors_with_detections(flight: Flight, wanted: Sequence[str] = ()) -> list[str]:
+    """The sensors that are named, or all that detected something.
+
+    Raises
+    ------
+    WildlabError
+        Where nothing was detected, or there is no such sensor.
+    """
+    seen = flight.detections
+    if seen is None or not len(seen):
+        raise WildlabError(
+            "there are no detections to track",
+            "add detections: wildlab import, wildlab detect",
+            file=flight.folder,
+            field="detections",
+        )
+    known = sensors_of(flight)
+    for name in wanted:
+        if name not in known:
+            raise WildlabError(
+                f"there is no sensor {name!r}",
+                f"use one of {', '.join(known)}",
+                file=flight.folder,
+                field="--sensor",
+            )
+    saw = set(seen["source"])
+    found = list(dict.fromkeys(wanted)) or [name for name in known if name in saw]
+    if not found:
+        raise WildlabError(
+            "no detection is by a sensor that the frames name",
+            f"give them one of these as source: {', '.join(known)}",
+            file=flight.folder,
+            field="detections.source",
+        )
+    return found
+
+
+def _identified(scans: Scans, targets: TargetModel) -> Scans:
+    """The scans with labels as far as they are to be believed."""
+    if targets.identified in ("gate", "one"):
+        return scans._replace(labels=np.full(scans.labels.shape, "", object))
+    if targets.identified == "label" and not scans.labelled:
+        raise WildlabError(
+            f"no detection of the sensor {scans.sensor!r} names its target",
+            'set identified = "gate" in [targets], or leave it out',
+            field="targets.identified",
+        )
+    return scans
+
+
+def _targets_of(flight: Flight, scans: Scans) -> list[Truth]:
+    """The targets that a sensor may follow, with their true places as far as they are known."""
+    truths = [] if flight.truth is None or not len(flight.truth) else truths_at(flight, scans.times)
+    nowhere = np.full((len(scans.times), 2), np.nan)
+    if not scans.labelled:
+        return truths or [Truth(UNNAMED, nowhere, nowhere, 0.0)]
+    by_name = {one.target: one for one in truths}
+    names = dict.fromkeys(str(one) for one in scans.labels.ravel() if one)
+    return [by_name.get(name) or Truth(name, nowhere, nowhere, 0.0) for name in names]
 
 
 class TrackingResult(NamedTuple):
@@ -51,7 +224,7 @@ class TrackingResult(NamedTuple):
     scans, beliefs
         By sensor.
     given
-        What filters were told, and who says so.
+        What filters were given, and who says so.
     notes
         What was done to the measurements, in sentences.
     truth
@@ -83,7 +256,7 @@ def track(
     Parameters
     ----------
     settings
-        What is told of sensors and targets besides ``flight.toml``.
+        What is stated of sensors and targets besides ``flight.toml``.
     tuned
         What another flight says of the sensors.
     filters
@@ -102,14 +275,15 @@ def track(
         Where there is no such sensor, target or filter, no detection, no time, or noise nobody knows.
     """
     inputs = read_inputs(flight, settings=settings, tuned=tuned, sensors=sensors, source=source)
-    said, notes, tracks = list(inputs.given), list(inputs.notes), list[SensorTrack]()
+    given, notes, tracks = list(inputs.given), list(inputs.notes), list[SensorTrack]()
     known: set[str] = set()
     for sensor, one in inputs.sensors.items():
-        said += one.given
+        given += one.given
         names, without = chosen_filters(one.scans, one.noise, filters)
         notes += without
-        notes += _not_smoothed(names, sensor) if smooth else []
-        names = _with_smoothed(names) if smooth else names
+        if smooth:
+            names, without = _smoothed(names, sensor)
+            notes += without
         for truth in one.truths:
             known.add(truth.target)
             if not targets or truth.target in targets:
@@ -118,12 +292,12 @@ def track(
                 tracks += mine
     _refuse_unknown(targets, known, flight)
     if all(one.scans.labelled for one in inputs.sensors.values()):
-        said = [one for one in said if one.subject != "targets" or one.what not in OF_UNNAMED]
+        given = [one for one in given if one.subject != "targets" or one.what not in OF_UNNAMED]
     truths = [truth for one in inputs.sensors.values() for truth in one.truths]
     if still := {truth.target for truth in truths if truth.fixed}:
-        said.append(GivenValue("targets", "at rest, as their truth has no time", str(len(still)), STATED))
+        given.append(GivenValue("targets", "at rest, as their truth has no time", str(len(still)), STATED))
     names = [name for name in (filters or (WHITE, "schmidt")) if name in ABLE]
-    names = list(dict.fromkeys([WHITE, *(_with_smoothed(names) if smooth else names)]))
+    names = list(dict.fromkeys([WHITE, *(_smoothed(names, "")[0] if smooth else names)]))
     for target in sorted(known):
         able = {
             name: one
@@ -137,7 +311,7 @@ def track(
         {name: one.scans for name, one in inputs.sensors.items()},
         {name: one.noise for name, one in inputs.sensors.items()},
         inputs.targets,
-        said,
+        given,
         notes,
         any(np.isfinite(truth.position).any() for truth in truths),
     )
@@ -176,18 +350,12 @@ def _refuse_unknown_filters(wanted: Sequence[str]) -> None:
             )
 
 
-def _with_smoothed(names: Sequence[str]) -> list[str]:
-    """Each with its smoothed one behind it, where there is such."""
+def _smoothed(names: Sequence[str], sensor: str) -> tuple[list[str], list[str]]:
+    """Each with its smoothed one behind it; and a sentence for each that has none."""
     both = [one for name in names for one in (name, f"{name}{SMOOTHED}")]
-    return [one for one in both if one in (*NAMES, *SMOOTHABLE)]
-
-
-def _not_smoothed(names: Sequence[str], sensor: str) -> list[str]:
-    """Filters that have no way back, in a sentence each."""
     without = [name for name in names if f"{name}{SMOOTHED}" not in SMOOTHABLE]
-    return [
-        f"The filter {name!r} of {sensor} was not smoothed: there is no smoother for it." for name in without
-    ]
+    notes = [f"The filter {name!r} of {sensor} was not smoothed: there is no smoother." for name in without]
+    return [one for one in both if one in (*NAMES, *SMOOTHABLE)], notes
 
 
 def _never(tracks: Sequence[SensorTrack], scans: Scans) -> list[str]:
@@ -196,10 +364,10 @@ def _never(tracks: Sequence[SensorTrack], scans: Scans) -> list[str]:
     if np.isfinite(one.estimate).any() or not one.near.any():
         return []
     why = {
-        "bearing": "its first bearings do not settle on a place; state range_m of the sensor, or tune it",
-        "velocity": "a velocity says nothing of the place; another sensor has to",
-        "pixel": "no ray meets the ground; is the height of its plane stated (plane_down_m)?",
-    }.get(scans.kind, "no detection has a platform beside it; do poses cover the flight?")
+        "bearing": "a bearing says no distance; state range_m of the sensor, or tune it",
+        "velocity": "a velocity gives no position",
+        "pixel": "no ray meets the ground; is plane_down_m right?",
+    }.get(scans.kind, "no detection has a pose; do poses cover the flight?")
     return [f"{one.target} was never followed by {one.sensor}: {why}."]
 
 
@@ -208,7 +376,7 @@ def _refuse_unknown(targets: Sequence[str], known: set[str], flight: Flight) -> 
         if name not in known:
             fix = f"use one of {', '.join(sorted(known))}"
             if known == {UNNAMED}:
-                fix = "leave --target out: no detection names one, and there is no truth"
+                fix = "leave --target out: detections name none"
             raise WildlabError(f"there is no target {name!r}", fix, file=flight.folder, field="--target")
 
 
@@ -228,4 +396,10 @@ def refuse_unusable(
         As `track`.
     """
     _refuse_unknown_filters(filters)
-    _refuse_unknown(targets, names_of(flight, settings, sensors, source), flight)
+    refuse_without_times(flight)
+    model, _ = model_targets(settings_of(flight, settings).targets)
+    known: set[str] = set()
+    for sensor in sensors_with_detections(flight, sensors):
+        scans = _identified(scans_of(flight, sensor, 0.0, source), model)
+        known |= {one.target for one in _targets_of(flight, scans)}
+    _refuse_unknown(targets, known, flight)

@@ -15,10 +15,10 @@ import numpy as np
 import pandas as pd
 from scipy.optimize import curve_fit, minimize, nnls
 
-from wildlab.analysis.tracks.inputs import SensorInputs, read_inputs
 from wildlab.analysis.tracks.noise_model import (
     GROUPS,
     Against,
+    SensorInputs,
     SensorTuning,
     TargetModel,
     Tuned,
@@ -36,13 +36,14 @@ from wildlab.analysis.tracks.scans import (
     truths_at,
 )
 from wildlab.analysis.tracks.single_target import choose
+from wildlab.analysis.tracks.tracker import read_inputs
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import effective_sample_size
 from wildlab.flight.store import Flight
 from wildlab.flight.tracking_settings import Settings
 from wildlab.geometry.frames import Array
 from wildlab.tracking.run import Start, run_filter
-from wildlab.tracking.sensors import Merged, cut
+from wildlab.tracking.sensors import Merged, head
 
 #: Offsets tried, s: the largest known delays are three.
 OFFSETS_S = np.arange(-5.0, 2.001, 0.05)
@@ -274,7 +275,7 @@ EVALUATIONS = 80
 
 
 class _Case(NamedTuple):
-    """One track by one sensor: looks as filters take them, what is measured at each, and where it starts."""
+    """One track by one sensor: scans as filters take them, what is measured at each, and where it starts."""
 
     sensor: str
     merged: Merged
@@ -307,7 +308,7 @@ def tune_by_innovations(
         if used < FEWEST:
             raise WildlabError(
                 f"only {used} detections of {sensor!r} can be followed",
-                "tune on a flight on which the sensor saw a target for longer",
+                "tune on a longer flight",
                 file=flight.folder,
                 field="detections",
             )
@@ -350,15 +351,14 @@ def _count(case: _Case) -> int:
 
 def _cases(sensor: str, one: SensorInputs, target: str, targets: TargetModel) -> list[_Case]:
     chosen = choose({sensor: one}, target, targets)
-    own = chosen.own.copy()
-    own[MOST_LOOKS:] = np.nan
     found = []
     for piece in chosen.pieces:
-        mine = own[piece.rows]
-        used = np.flatnonzero(np.isfinite(mine[:, 0]))
-        rows = slice(0, max(int(used[-1]) + 1 if len(used) else 0, piece.begin.row + 1))
-        merged = cut(chosen.merged, slice(piece.first, piece.first + rows.stop))
-        found.append(_Case(sensor, merged, mine[rows], piece.begin))
+        inside = piece.inside(min(len(chosen.own), MOST_LOOKS))
+        own = np.where(inside[:, None], chosen.own[: len(inside)], np.nan)
+        used = np.flatnonzero(np.isfinite(own[:, 0]))
+        count = max([1, piece.begin.row + 1, *(used[-1:] + 1)])
+        if count <= len(own):
+            found.append(_Case(sensor, head(chosen.merged, count), own[:count], piece.begin))
     return found
 
 
@@ -408,7 +408,7 @@ def tune_flight(
     if against == "truth" and not has_truth:
         raise WildlabError(
             f"the flight {flight.name!r} has no truth to tune against",
-            "tune by its innovations (--against innovations), or on another flight",
+            "use --against innovations, or another flight",
             file=flight.folder,
             field="--against",
         )
@@ -439,7 +439,7 @@ def refuse_same(flight: Flight, other: Flight) -> None:
     alike = len(both[0].merge(both[1]))
     if alike >= max(ALIKE, SHARE * min(map(len, both))):
         raise WildlabError(
-            f"this is the flight that is judged, or part of it: {alike} of its detections have the same "
+            f"this is the flight that is judged: {alike} of its detections have the same "
             "stamps and values, and nothing is tuned where it is judged",
             "tune on another flight",
             file=other.folder,

@@ -1,13 +1,13 @@
 """All targets of a flight at once: scan after scan, whichever sensor it is of.
 
-Errors that a look's measurements share move all of them: what one target tells of them serves another. Given
+Errors that a scan's measurements share move all of them: what one target tells of them serves another. Given
 these errors, targets are independent. What each target's measurements tell of them is kept as one Gaussian,
 of which a pair that nobody is sure of makes little; and what all others tell, never a target itself, says
 where its measurement is to be expected. That is repeated, since all are surer then: belief propagation
 between the targets' associations and the errors. Only the probabilities of association come from it.
 Estimates are corrected with the errors considered and not estimated, as of H 7.4: what other targets tell of
-them would be used again at the next look as if it were new. Where errors last, places relative to each other
-are known well nevertheless; where each look has another error, they are known no better than the places
+them would be used again at the next scan as if it were new. Where errors last, places relative to each other
+are known well nevertheless; where each scan has another error, they are known no better than the places
 themselves.
 
 Back over the tracks, once the flight is over, which measurements were of which target stays as it was taken
@@ -33,6 +33,7 @@ from scipy.spatial import cKDTree
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.tracking.association import association_probabilities
+from wildlab.tracking.kalman import fade
 from wildlab.tracking.many.target_model import (
     LEAST_KIND,
     ManySensorModel,
@@ -66,7 +67,6 @@ from wildlab.tracking.many.tracks import (
     without_doubles,
 )
 from wildlab.tracking.motion import white_acceleration
-from wildlab.tracking.schmidt import fade
 
 #: How often what all tell each other is asked again. After the second time little changes.
 ROUNDS = 2
@@ -80,7 +80,7 @@ def of_all(values: Array, near: NDArray[np.intp], count: int) -> Array:
     return dense
 
 
-def told_by_others(compared: Compared, weight: Array) -> tuple[Array, Array]:
+def learnt_from_others(compared: Compared, weight: Array) -> tuple[Array, Array]:
     """What all other targets tell each one of the shared errors.
 
     Parameters
@@ -108,9 +108,9 @@ def told_by_others(compared: Compared, weight: Array) -> tuple[Array, Array]:
     spread = np.einsum("tkm,tkmij->tij", share, alone)
     spread[probable <= 0] = np.eye(2)
     by_spread = np.swapaxes(np.linalg.solve(spread, moved), -1, -2) * probable[:, None, None]
-    information, told = by_spread @ moved, (by_spread @ middle[..., None])[..., 0]
+    information, pulled = by_spread @ moved, (by_spread @ middle[..., None])[..., 0]
     covariance = np.linalg.inv(np.eye(k) + information.sum(axis=0) - information)
-    mean = (covariance @ (told.sum(axis=0) - told)[..., None])[..., 0]
+    mean = (covariance @ (pulled.sum(axis=0) - pulled)[..., None])[..., 0]
     return mean, covariance
 
 
@@ -153,7 +153,7 @@ def moved_together(
         of_kind = kinds[..., None] * likelihood
         of_any = of_kind.sum(axis=1, keepdims=True)
         share = np.divide(of_kind, of_any, out=np.zeros_like(of_kind), where=of_any > 0)
-        mean, covariance = told_by_others(compared, share * mine[:, None])
+        mean, covariance = learnt_from_others(compared, share * mine[:, None])
         left = nu - np.einsum("tkmij,tj->tkmi", G, mean)
         spread = alone + G @ covariance[:, None, None] @ np.swapaxes(G, -1, -2)
         likelihood = np.where((near >= 0)[:, None], likelihoods(left, spread, gate), 0.0)
@@ -168,7 +168,7 @@ CERTAIN = 0.999
 
 
 class Measured(NamedTuple):
-    """M measurements of a look that are within reach: as in `Scan`, but (M, m, k) of errors that are shared
+    """M measurements of a scan that are within reach: as in `Scan`, but (M, m, k) of errors that are shared
     are always there."""
 
     z: Array
@@ -210,8 +210,8 @@ def run_many(
     targets
         What is known of the targets.
     lasting_s
-        (k,) of each error that measurements of a look share (`Scan.shared`), for how long it lasts: a
-        first-order process of that correlation time, of which zero is another error at each look, and
+        (k,) of each error that measurements of a scan share (`Scan.shared`), for how long it lasts: a
+        first-order process of that correlation time, of which zero is another error at each scan, and
         infinity one for the whole flight.
 
     Returns
@@ -222,7 +222,7 @@ def run_many(
     Raises
     ------
     WildlabError
-        Where a scan has no time, is of a sensor that is not there, or shares other errors than are told of.
+        Where a scan has no time, is of a sensor that is not there, or shares other errors than are given.
     """
     return [shown for _, shown in follow_many(scans, sensors, targets, lasting_s)]
 
@@ -403,7 +403,7 @@ def _compared(
         nothing = compare(tracks.x, tracks.P, offset, noise, z, R, gate, tracks.C, shared)
         return nothing, np.zeros((T, 0), np.intp), np.zeros((T, K, 0))
     spread = np.trace(tracks.P[..., :2, :2] + noise, axis1=-2, axis2=-1).max(axis=1)
-    # Of what track and look have in common no more than twice the sum of both can be in an innovation.
+    # Of what track and scan have in common no more than twice the sum of both can be in an innovation.
     common = 2 if sensor.correlation or shared.any() else 1
     noises = np.trace(R, axis1=-2, axis2=-1) + (shared**2).sum(axis=(-2, -1))
     widest = gate * np.sqrt(common * (spread + noises.max()))

@@ -45,7 +45,7 @@ class ManySensorModel(NamedTuple):
         Between which distances it sees; measurements from elsewhere are not used, and targets there are not
         missed.
     patience_s
-        For how long a target is shown after it saw it last.
+        For time shown after it was last seen.
     rough_m
         (K,) standard deviation of each axis that a hull adds to the noise of a measurement: which part of it
         is seen.
@@ -162,7 +162,7 @@ Sees = Callable[[Array], NDArray[np.bool_]]
 
 
 class Scan(NamedTuple):
-    """One look of one sensor.
+    """One scan of one sensor.
 
     Attributes
     ----------
@@ -179,7 +179,7 @@ class Scan(NamedTuple):
         Which of (N, 2) places a camera shows, (N,) bool; None: whatever is within reach is looked at.
     shared
         (M, 2, k) of places: how far, m, each is moved by one standard deviation of each of k errors that all
-        measurements of the look have in common, such as those of the platform's pose. ``R`` is without them.
+        measurements of the scan have in common, such as those of the platform's pose. ``R`` is without them.
         None: there are none.
     """
 

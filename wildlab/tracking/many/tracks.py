@@ -25,6 +25,7 @@ from scipy.spatial import cKDTree
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array, wrap
+from wildlab.tracking.kalman import fade
 from wildlab.tracking.many.target_model import (
     ManySensorModel,
     ManyTargetModel,
@@ -35,7 +36,6 @@ from wildlab.tracking.many.target_model import (
     own_columns,
 )
 from wildlab.tracking.motion import white_acceleration
-from wildlab.tracking.schmidt import fade
 from wildlab.tracking.sensors import left_out
 
 
@@ -230,7 +230,7 @@ class Tracks(NamedTuple):
         (T, K, 4) north, east and their velocities, and (T, K, 4, 4); m and s.
     C
         (T, K, 4, k) covariance of a track's error, truth minus estimate, with each of k errors of sensors, in
-        their standard deviations: those that all measurements of a look share (`Scan.shared`), and behind
+        their standard deviations: those that all measurements of a scan share (`Scan.shared`), and behind
         them those that each target has of its own (`wildlab.tracking.many.target_model.own_lasting`).
     kinds
         (T, K) probabilities.
@@ -536,7 +536,7 @@ def compare(
         alone = (1 - correlation) * alone
     S = P[..., None, :2, :2] + alone
     if G.shape[-1]:
-        # H (7.34) with both halves of what track and look have in common.
+        # H (7.34) with both halves of what track and scan have in common.
         S = S + G @ np.swapaxes(G, -1, -2) - (C[..., :2, :] @ np.swapaxes(C[..., :2, :], -1, -2))[:, :, None]
     H = np.broadcast_to(np.eye(2), (*x.shape[:2], 2, 2))
     return Compared(innovation, S, likelihoods(innovation, S, gate), H, G)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.planning.ground import FLAT, with_wall
-from wildlab.analysis.animals.images import (
+from wildlab.analysis.animal_images import (
     Detector,
     footprint_circles,
     put_on_ground,

@@ -18,15 +18,14 @@ from wildlab.tracking.particles import (
     effective_size,
     moments,
     move,
+    pick,
     resample,
-    sight_of,
     start_gaussian,
     stay_inside,
     walk_of,
     weigh,
     weigh_unseen,
 )
-from wildlab.tracking.particles.clouds import pick
 
 
 def some_cloud(seed, animals=3, particles=40, n=4):
@@ -83,18 +82,6 @@ def test_a_start_has_its_mean_and_covariance(rng):
     error = np.sqrt((np.outer(sd**2, sd**2) + P**2) / N)
     assert (np.abs(covariance - P) <= 5 * error + 1e-12).all()
     assert not np.array_equal(cloud.x[0], cloud.x[1])
-
-
-def test_a_footprint_is_read_at_the_nearest_node(rng):
-    mask = rng.random((5, 7)) < 0.5
-    sight = sight_of(mask, 100.0, -20.0, 4.0, 0.7)
-    at = np.stack(np.meshgrid(np.arange(5), np.arange(7), indexing="ij"), axis=-1)
-    places = np.array([100.0, -20.0]) + 4.0 * (at + rng.uniform(-0.49, 0.49, at.shape))
-    np.testing.assert_array_equal(sight(places), 0.7 * mask)
-    assert (sight(places + np.array([40.0, 0.0])) == 0).all() and (
-        sight(places - np.array([0.0, 40.0])) == 0
-    ).all()
-    assert sight(np.array([np.nan, 0.0])) == 0
 
 
 def uneven(rng, animals, particles):

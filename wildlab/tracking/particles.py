@@ -1,5 +1,18 @@
-"""Clouds of particles, F 4.2: how they move, how a measurement or its absence weighs them, and a new set
-where few carry the weight.
+"""Particle filters: many animals at once, seen and not seen, and kept in by a fence (F 4.2, 4.3).
+
+Animals are the first axis, particles the second: states (A, N, n), weights (A, N). A step of the filter is
+`move` and `stay_inside`; then `weigh` with a `log_likelihood`, or `weigh_unseen` where an image looked and
+found nothing; then `moments`, and `resample`. Always resampling is SIR, by the effective size alone SIS.
+`nearest_animal` is F's rule of association.
+
+>>> rng = np.random.default_rng(1)
+>>> cloud = start_gaussian([[0.0, 0.0]], 400 * np.eye(2), 2000, rng)
+>>> cloud = move(cloud, walk_of(0.5, 1.0), 10.0, rng)
+>>> cloud, log_evidence = weigh(cloud, log_likelihood(cloud.x, [[12.0, 3.0]], 4 * np.eye(2)))
+>>> cloud, resampled = resample(cloud, rng)
+>>> mean, covariance = moments(cloud)
+>>> bool(np.hypot(*(mean[0] - [12.0, 3.0])) < 1.0), resampled
+(True, array([ True]))
 
 Particles move by the motion model itself (prior sampling, F (4.15)). F's random walk (4.5) draws a velocity
 for each step and holds it over that step, and F does not say how long a step is. The spread after a time
@@ -20,9 +33,28 @@ from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.compilation import compiled
-from wildlab.geometry.covariances import check_covariance
+from wildlab.geometry.covariances import check_covariance, gate_threshold
 from wildlab.geometry.frames import Array
+from wildlab.tracking.association import innovation_squared
 from wildlab.tracking.motion import Motion, random_walk
+
+__all__ = [
+    "Cloud",
+    "Weighed",
+    "draw",
+    "effective_size",
+    "log_likelihood",
+    "mahalanobis_squared",
+    "moments",
+    "move",
+    "nearest_animal",
+    "resample",
+    "start_gaussian",
+    "stay_inside",
+    "walk_of",
+    "weigh",
+    "weigh_unseen",
+]
 
 
 @compiled
@@ -155,7 +187,7 @@ def weigh(cloud: Cloud, log_likelihood: ArrayLike) -> Weighed:
     if not known:
         raise WildlabError(
             "a likelihood is not a number",
-            "give minus infinity where a particle cannot have made the measurement",
+            "give minus infinity for what is impossible",
             field="log_likelihood",
         )
     return Weighed(Cloud(cloud.x, w), log_evidence)
@@ -187,7 +219,7 @@ def weigh_unseen(cloud: Cloud, detection: ArrayLike) -> Weighed:
     if not ((p >= 0) & (p <= 1)).all():
         raise WildlabError(
             "a probability of detection is not from 0 to 1",
-            "give 0 where the camera does not look or cannot see, and no NaN",
+            "give 0 outside the footprint, and no NaN",
             field="detection",
         )
     with np.errstate(divide="ignore"):
@@ -414,56 +446,6 @@ def log_likelihood(positions: ArrayLike, z: ArrayLike, R: ArrayLike) -> Array:
     return total
 
 
-def sight_of(mask: ArrayLike, north: float, east: float, step: float, probability: float = 1.0) -> Sight:
-    """A footprint as a function of places, from the nodes of a grid that an image shows.
-
-    Parameters
-    ----------
-    mask
-        (rows to the north, columns to the east): bool where a node is in the footprint and nothing hides it,
-        or the probability of detection there.
-    north, east
-        Of the first node, m.
-    step
-        Between nodes, m.
-    probability
-        With which the detector finds an animal that is in sight.
-
-    Returns
-    -------
-    Sight
-        Of the node nearest to a place; 0 off the grid.
-
-    Raises
-    ------
-    WildlabError
-        Where a probability is not from 0 to 1, or the step not above zero.
-
-    Examples
-    --------
-    >>> sight = sight_of([[True, False], [True, True]], north=0.0, east=0.0, step=10.0, probability=0.8)
-    >>> print(sight(np.array([[1.0, 2.0], [1.0, 8.0], [-20.0, 0.0]])))
-    [0.8 0.  0. ]
-    """
-    shown = probability * np.asarray(mask, float)
-    if not ((shown >= 0) & (shown <= 1)).all() or not step > 0:
-        raise WildlabError(
-            "a mask of probabilities outside 0 to 1, or a step that is not above zero",
-            "give bools or probabilities of detection, and metres between nodes",
-            field="mask",
-        )
-    rows, columns = shown.shape
-
-    def sight(places: Array) -> Array:
-        at = np.asarray(places, float)
-        i, j = (np.rint((at[..., a] - start) / step) for a, start in enumerate((north, east)))
-        on = (i >= 0) & (i < rows) & (j >= 0) & (j < columns)
-        row, column = (np.where(on, one, 0).astype(np.intp) for one in (i, j))
-        return np.asarray(np.where(on, shown[row, column], 0.0))
-
-    return sight
-
-
 def walk_of(sd_velocity: float, step: float) -> Motion:
     """F (4.5) with the step that its noise depends on: as spread out after any number of steps.
 
@@ -544,3 +526,64 @@ def stay_inside(before: Cloud, after: Cloud, inside: Inside) -> Cloud:
     stayed = before.x.copy()
     stayed[..., 2:] = 0.0
     return Cloud(np.where(kept[..., None], after.x, stayed), after.w)
+
+
+def mahalanobis_squared(mean: ArrayLike, covariance: ArrayLike, z: ArrayLike, R: ArrayLike) -> Array:
+    """Squares of D_M, F (4.19), between A animals and M detections.
+
+    D_M is a root, and F (4.20) compares it with a quantile of the chi-square distribution, which is that of
+    its square. It is the square that is compared here. By the letter of (4.20) a gate of 99 % is one of 9.21
+    standard deviations, which shuts out next to nothing.
+
+    Parameters
+    ----------
+    mean, covariance
+        (A, n) and (A, n, n); north and east, m, are the first two.
+    z
+        (M, 2) m.
+    R
+        (M, 2, 2), or (2, 2) for all, m^2.
+
+    Returns
+    -------
+    (A, M)
+    """
+    x, P = np.asarray(mean, float)[:, None, :2], np.asarray(covariance, float)[:, None, :2, :2]
+    found = np.asarray(z, float).reshape(-1, 2)
+    S = P + np.broadcast_to(np.asarray(R, float), (len(found), 2, 2))
+    return innovation_squared(found - x, S)
+
+
+def nearest_animal(squared: ArrayLike, gate_probability: float) -> NDArray[np.int64]:
+    """F's modified nearest neighbour, F 4.3.1: each *detection* takes its closest track within the gate.
+
+    A track may be taken by several detections, whose likelihoods (4.11) multiplies, and a group of animals
+    gets fewer tracks than it has animals: how many tracks there are is no count of animals.
+
+    Parameters
+    ----------
+    squared
+        (A, M) as `mahalanobis_squared` has it.
+    gate_probability
+        Probability that an animal's own detection is let in, in (0, 1]; 1 is no gate.
+
+    Returns
+    -------
+    (M,) index of the track, -1 where none lies within the gate.
+
+    Raises
+    ------
+    WildlabError
+        For a probability outside (0, 1].
+
+    Examples
+    --------
+    >>> print(nearest_animal([[1.0, 4.0, 30.0], [2.0, 90.0, 20.0]], 0.99))
+    [ 0  0 -1]
+    """
+    d = np.asarray(squared, float)
+    if not len(d):
+        return np.full(d.shape[1], -1)
+    d = np.where(np.isnan(d), np.inf, d)
+    limit = min(gate_threshold(gate_probability, 2), float(np.finfo(float).max))
+    return np.asarray(np.where(d.min(axis=0) <= limit, d.argmin(axis=0), -1))

@@ -1,6 +1,7 @@
 """Particles against exact answers: Kalman's filter and a grid."""
 
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -8,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import chi2, norm
 
-from tests.tracking.particles.worlds import Grid, grid_over, grid_weigh, walk_matrix
 from tests.tracking.poses import GENERATORS
 from wildlab.tracking import kalman
 from wildlab.tracking.motion import constant_velocity
@@ -21,7 +21,6 @@ from wildlab.tracking.particles import (
     move,
     nearest_animal,
     resample,
-    sight_of,
     start_gaussian,
     weigh,
     weigh_unseen,
@@ -85,6 +84,40 @@ def test_particles_become_the_kalman_filter_at_the_rate_of_monte_carlo(threshold
     assert off[-1] < 0.1
 
 
+class Grid(NamedTuple):
+    """The middles (C, 2) m of the cells of an enclosure, and the side of a cell, m."""
+
+    places: np.ndarray
+    step: float
+
+
+def grid_over(inside, low, high, step):
+    """The cells whose middle lies in an enclosure."""
+    axes = [np.arange(low[a] + step / 2, high[a], step) for a in range(2)]
+    every = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+    return Grid(every[inside(every)], step)
+
+
+def walk_matrix(grid, density, dt):
+    """(C, C) probability of going to the row's cell from the column's; a step that leads out is not taken."""
+    sd = density * np.sqrt(dt)
+    reach = int(np.ceil(8 * sd / grid.step)) + 1
+    line = np.exp(-0.5 * (grid.step * np.arange(-reach, reach + 1) / sd) ** 2)
+    line /= line.sum()
+    steps = np.rint((grid.places[:, None] - grid.places[None]) / grid.step).astype(int)
+    near = (np.abs(steps) <= reach).all(axis=-1)
+    at = np.where(near[..., None], steps + reach, 0)
+    matrix = np.where(near, line[at[..., 0]] * line[at[..., 1]], 0.0)
+    matrix[np.diag_indices(len(matrix))] += 1 - matrix.sum(axis=0)
+    return matrix
+
+
+def grid_weigh(p, likelihood):
+    """Measurement update of a grid, F (4.9)-(4.10) with all cells as particles; and the evidence."""
+    raw = p * likelihood
+    return raw / raw.sum(), raw.sum()
+
+
 # A small world: a fence with a corner cut off, images that look at parts of it, something that hides a part.
 STEP = 4.0
 
@@ -97,6 +130,11 @@ def cut_corner(places):
 GRID = grid_over(cut_corner, [0, 0], [40, 48], STEP)
 
 
+def sight_of(shown):
+    """The probability of detection at places, from that of each cell (10, 12)."""
+    return lambda places: shown[tuple(np.moveaxis((places / STEP).astype(int), -1, 0))]
+
+
 def looks():
     """Six images: a half of the world each, a hidden block in it, a detector that misses some."""
     rng = np.random.default_rng(9)
@@ -105,7 +143,7 @@ def looks():
         mask[:, 6:] = k % 2
         mask[:, :6] = 1 - k % 2
         mask[3:6, 2:9] = 0.0
-        yield sight_of(mask, STEP / 2, STEP / 2, STEP, probability=rng.uniform(0.5, 0.95))
+        yield sight_of(mask * rng.uniform(0.5, 0.95))
 
 
 def test_seeing_nothing_is_the_grid_filter_within_the_error_of_the_draws():

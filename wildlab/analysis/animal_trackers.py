@@ -10,30 +10,45 @@ and (5.3); it is then found again, or lost by the images that should have shown 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.analysis.animals.images import (
+from wildlab.analysis.animal_images import (
     Detector,
     Images,
+    Sight,
     footprint_circles,
     sight_from,
     take_images,
 )
 from wildlab.analysis.plans.coverage import ExecutionErrors, displaced, drawn_errors
 from wildlab.geometry.camera import Camera
+from wildlab.geometry.covariances import gate_threshold
 from wildlab.geometry.frames import Array, Indices, Mask
 from wildlab.geometry.terrain import Terrain
 from wildlab.planning.gimbal import GimbalAngles, camera_on_course
 from wildlab.planning.planner import SEARCH, all_positioned, best_goal
+from wildlab.tracking.association import global_nearest
 from wildlab.tracking.kalman import update
 from wildlab.tracking.motion import Motion
-from wildlab.tracking.particles import ImageLook, Rules, mahalanobis_squared, moments, nearest_animal, no_herd
-from wildlab.tracking.particles.clouds import Cloud, Inside, move, stay_inside
-from wildlab.tracking.particles.steps import step_nearest
+from wildlab.tracking.particles import (
+    Cloud,
+    Inside,
+    effective_size,
+    log_likelihood,
+    mahalanobis_squared,
+    moments,
+    move,
+    nearest_animal,
+    resample,
+    start_gaussian,
+    stay_inside,
+    weigh,
+    weigh_unseen,
+)
 
 #: A walk within a fence is cut into steps no longer than this, s; and tracks are looked at as often.
 STATION_S = 20.0
@@ -69,8 +84,6 @@ class Found(NamedTuple):
         Where, and whose it is; -1 where it is of no animal.
     track
         That it was given to, or that it started.
-    started
-        Whether it started it.
     before, after
         Trace of that track's covariance before the image and after it, m^2; NaN before its start.
     after_last
@@ -86,7 +99,6 @@ class Found(NamedTuple):
     image: int
     animal: int
     track: int
-    started: bool
     before: float
     after: float
     after_last: float
@@ -95,7 +107,7 @@ class Found(NamedTuple):
     away: float
 
 
-class FollowedAnimals(NamedTuple):
+class TrackedAnimals(NamedTuple):
     """A way with its tracks.
 
     Attributes
@@ -106,97 +118,200 @@ class FollowedAnimals(NamedTuple):
         Every detection.
     steps
         How many images were looked at.
-    tracks
-        How many tracks were started.
     """
 
     known: list[Known]
     found: list[Found]
     steps: int
-    tracks: int
 
 
-class Follower(Protocol):
+class ImageScan(NamedTuple):
+    """One image.
+
+    Attributes
+    ----------
+    time
+        s.
+    z, R
+        (M, 2) detections on the ground, north and east, m, NaN where a ray met none; and (M, 2, 2) m^2.
+    sight
+        Footprint, line of sight and detector.
+    """
+
+    time: float
+    z: Array
+    R: Array
+    sight: Sight
+
+    @property
+    def usable(self) -> Mask:
+        """(M,) detections that have a place."""
+        return np.asarray(np.isfinite(self.z).all(axis=1) & np.isfinite(self.R).all(axis=(1, 2)))
+
+
+class Tracker(Protocol):
     """Tracks that go on image by image."""
 
-    def step(self, look: ImageLook) -> NDArray[np.int64]:
-        """One image; (M,) the track that each detection was given."""
+    def step(self, scan: ImageScan) -> NDArray[np.int64]:
+        """One image, no earlier than the last; (M,) the track of each detection, 0 where that is NaN."""
 
     def known(self) -> tuple[NDArray[np.int64], Array, Array]:
         """Numbers (K,), means (K, 2) m and covariances (K, 2, 2) m^2."""
 
     def reach(self) -> Array:
-        """(K,) how far off its mean an animal may be for an image without detections to tell, m."""
+        """(K,) how far from its mean an animal may be for an image without detections to tell, m."""
 
 
-class Particles:
-    """Tracks by F's particle filter, each kept inside the fence that it began in."""
+#: A detection that leaves a cloud with fewer particles' worth of weight than this says more than they can.
+LEAST_EFFECTIVE = 10.0
+
+
+class ParticleTracker:
+    """Tracks by F's particle filter (F 4.3, 5.3), each kept inside the fence that it began in.
+
+    Each detection takes its closest track, whose particles it weighs by (4.11), and what lies in no gate
+    starts a track, one for each: F does not say whether the second detection of a group takes the track that
+    the first has just started. A lost track is kept, moves on, and may be re-identified.
+
+    Parameters
+    ----------
+    motion
+        How animals walk.
+    fences
+        Of the enclosures.
+    rng
+        Random numbers.
+    particles
+        Of each animal.
+    gate_probability
+        That an animal's own detection is let in.
+    negative
+        Whether images without a detection count, F 4.2.2.
+    """
 
     def __init__(
-        self, motion: Motion, fences: list[Inside], rng: np.random.Generator, rules: Callable[..., Rules]
-    ) -> None:
+        self, motion: Motion, fences: Sequence[Inside], rng: np.random.Generator, *, particles: int = 500,
+        gate_probability: float = 0.99, negative: bool = True,
+    ) -> None:  # fmt: skip
         self._motion, self._fences, self._rng = motion, fences, rng
-        self._home = np.zeros(0, np.intp)
-        self.rules = rules(self._moves)
-        self.herd = no_herd(self.rules)
-        self._moments = moments(self.herd.cloud)
+        self._particles, self._gate, self._negative = particles, gate_probability, negative
+        self._time = np.nan
+        self.cloud = Cloud(np.zeros((0, particles, 2)), np.zeros((0, particles)))
+        #: By track: which fence it began in, -1 for none; when it was last detected, s; whether it is lost.
+        self.home, self.seen_at, self.lost = np.zeros(0, np.intp), np.zeros(0), np.zeros(0, bool)
+        self._moments = moments(self.cloud)
 
-    def _moves(self, cloud: Cloud, seen: Mask, dt: float, rng: np.random.Generator) -> Cloud:
+    def step(self, scan: ImageScan) -> NDArray[np.int64]:
+        """As `Tracker` has it: nearest neighbour, (4.11), and the negative update."""
+        usable = scan.usable
+        z, R = scan.z[usable], scan.R[usable]
+        if scan.time > self._time:
+            self._move(scan.time - self._time)
+        self._time = scan.time
+        taken, found = self._associated(z, R)
+        seen = np.isin(np.arange(len(self.lost)), taken)
+        if self._negative:
+            unseen = weigh_unseen(self.cloud, scan.sight(self.cloud.x)).cloud
+            found = Cloud(found.x, np.where(seen[:, None], found.w, unseen.w))
+        self.cloud, self.lost = found, self.lost & ~seen
+        self.seen_at = np.where(seen, scan.time, self.seen_at)
+        new = np.flatnonzero(taken < 0)
+        taken[new] = len(self.lost) + np.arange(len(new))
+        if len(new):
+            self._start(start_gaussian(z[new], R[new], self._particles, self._rng))
+        if len(self.lost):
+            self.cloud, _ = resample(self.cloud, self._rng)
+        self._moments = moments(self.cloud)
+        names = np.zeros(len(usable), np.int64)
+        names[usable] = taken + 1
+        return names
+
+    def _move(self, dt: float) -> None:
         steps = max(int(np.ceil(dt / STATION_S - 1e-9)), 1)
-        for _ in range(steps):
-            cloud = stay_inside(cloud, move(cloud, self._motion, dt / steps, rng), self._inside)
-        return cloud
+        for _ in range(steps if len(self.lost) else 0):
+            moved = move(self.cloud, self._motion, dt / steps, self._rng)
+            self.cloud = stay_inside(self.cloud, moved, self._inside)
 
     def _inside(self, places: Array) -> Mask:
         """(K, N) whether places (K, N, 2) are inside the fence that each track began in."""
         inside = np.ones(places.shape[:-1], bool)
         for number, fence in enumerate(self._fences):
-            mine = self._home == number
+            mine = self.home == number
             if mine.any():
                 inside[mine] = fence(places[mine])
         return inside
 
-    def step(self, look: ImageLook) -> NDArray[np.int64]:
-        """As `Follower` has it."""
-        self.herd, names = step_nearest(self.herd, look, self.rules, self._rng)
-        self._moments = moments(self.herd.cloud)
-        new = self.herd.cloud.x[len(self._home) :, :, :2]
-        if len(new):
-            # Where most of a new cloud lies; outside all fences none keeps it.
-            shares = np.array([fence(new).mean(axis=1) for fence in self._fences])
-            home = np.where(shares.max(axis=0) > 0, shares.argmax(axis=0), -1)
-            self._home = np.append(self._home, home.astype(np.intp))
-        return names
+    def _associated(self, z: Array, R: Array) -> tuple[NDArray[np.int64], Cloud]:
+        """The track (M,) of each detection, -1 for none; the clouds after them."""
+        given = np.zeros(self.cloud.w.shape)
+        if not len(z):
+            return np.zeros(0, np.int64), weigh(self.cloud, given).cloud
+        mean, covariance = moments(self.cloud)
+        squared = mahalanobis_squared(mean, covariance, z, R)
+        taken = nearest_animal(np.where(self.lost[:, None], np.inf, squared), self._gate)
+        # Then those that were lost, one detection each: a lap later no two are likely to be one animal's.
+        limit = min(gate_threshold(self._gate, 2), 1e6)
+        free = taken < 0
+        again = global_nearest(np.where(self.lost[:, None] & free, squared, np.inf).T, limit)
+        taken = np.where(free, again.track, taken)
+        for j in np.flatnonzero(taken >= 0):
+            given[taken[j]] += log_likelihood(self.cloud.x[taken[j]], z[j], R[j])
+        found = weigh(self.cloud, given).cloud
+        return taken, self._revived(found, taken, mean, covariance, z, R)
 
-    @property
-    def home(self) -> Indices:
-        """(K,) which fence each track began in, -1 for none."""
-        return self._home
+    def _revived(
+        self, cloud: Cloud, taken: NDArray[np.int64], mean: Array, covariance: Array, z: Array, R: Array
+    ) -> Cloud:
+        """Clouds of which a detection leaves hardly a particle, drawn anew about it.
+
+        A sharp detection at the edge of a wide cloud gives one particle all the weight, and what resampling
+        makes of that is a point that knows nothing of its error. Such a cloud is drawn from the normal
+        distribution that a Kalman filter would have come to from the cloud's own mean (K, 2) and covariance.
+        """
+        thin = effective_size(cloud.w) < LEAST_EFFECTIVE
+        x, w = cloud.x.copy(), cloud.w.copy()
+        for a in np.flatnonzero(thin & np.isin(np.arange(len(thin)), taken)):
+            at, P = mean[a], covariance[a]
+            for j in np.flatnonzero(taken == a):
+                after = update(at, P, z[j], np.eye(2), R[j])
+                at, P = after.x, after.P
+            fresh = start_gaussian(at[None], ((P + P.T) / 2)[None], x.shape[1], self._rng)
+            x[a], w[a] = fresh.x[0], fresh.w[0]
+        return Cloud(x, w)
+
+    def _start(self, cloud: Cloud) -> None:
+        """Add tracks at the time of the image; their home is the fence that holds most of their cloud."""
+        home, most = np.full(len(cloud.w), -1, np.intp), np.zeros(len(cloud.w))
+        for number, fence in enumerate(self._fences):
+            share = fence(cloud.x).mean(axis=1)
+            home[share > most] = number
+            most = np.maximum(share, most)
+        self.cloud = Cloud._make(map(np.concatenate, zip(self.cloud, cloud, strict=True)))
+        self.home = np.append(self.home, home)
+        self.seen_at = np.append(self.seen_at, np.full(len(home), self._time))
+        self.lost = np.append(self.lost, np.zeros(len(home), bool))
 
     def seen_now(self, track: int) -> bool:
         """Whether the latest image had a detection of a track, by its number."""
-        mine = self.herd.identity == track
-        return bool((self.herd.seen_at[mine] == self.herd.time).any())
+        return bool(track > 0 and self.seen_at[track - 1] == self._time)
 
     def give_up(self, track: int) -> None:
         """Take a track, by its number, for lost: it was looked for and not found (F 5.3.4)."""
-        lost = self.herd.lost | (self.herd.identity == track)
-        self.herd = self.herd._replace(lost=lost)
+        self.lost[track - 1] = True
 
     def known(self) -> tuple[NDArray[np.int64], Array, Array]:
-        """As `Follower` has it."""
-        mean, covariance = self._moments
-        return self.herd.identity, mean[:, :2], covariance[:, :2, :2]
+        """As `Tracker` has it."""
+        return np.arange(len(self.lost)) + 1, *self._moments
 
     def reach(self) -> Array:
-        """As `Follower` has it."""
-        if not self.rules.negative or not len(self.herd.identity):
-            return np.full(len(self.herd.identity), -np.inf)
-        off = self.herd.cloud.x[..., :2] - self._moments[0][:, None, :2]
-        return np.hypot(off[..., 0], off[..., 1]).max(axis=1)
+        """As `Tracker` has it."""
+        if not self._negative or not len(self.lost):
+            return np.full(len(self.lost), -np.inf)
+        away = self.cloud.x - self._moments[0][:, None]
+        return np.hypot(away[..., 0], away[..., 1]).max(axis=1)
 
 
-class Kalman:
+class KalmanTracker:
     """The same rule of association with a Kalman filter for each track, which no image without detections and
     no fence can tell anything: the ellipse that F 8.3 holds the particle filter against."""
 
@@ -205,15 +320,15 @@ class Kalman:
         self._time = np.nan
         self._mean, self._P = np.zeros((0, 2)), np.zeros((0, 2, 2))
 
-    def step(self, look: ImageLook) -> NDArray[np.int64]:
-        """As `Follower` has it."""
+    def step(self, scan: ImageScan) -> NDArray[np.int64]:
+        """As `Tracker` has it."""
         if len(self._mean):
-            F, Q = self._motion(look.time - self._time)
+            F, Q = self._motion(scan.time - self._time)
             self._mean, self._P = self._mean @ F.T, F @ self._P @ F.T + Q
-        self._time = look.time
-        usable = np.isfinite(look.z).all(axis=1) & np.isfinite(look.R).all(axis=(1, 2))
-        z, R = look.z[usable], look.R[usable]
-        names = np.zeros(len(look.z), np.int64)
+        self._time = scan.time
+        usable = scan.usable
+        z, R = scan.z[usable], scan.R[usable]
+        names = np.zeros(len(usable), np.int64)
         if not len(z):
             return names
         taken = nearest_animal(mahalanobis_squared(self._mean, self._P, z, R), self._gate)
@@ -228,16 +343,16 @@ class Kalman:
         return names
 
     def known(self) -> tuple[NDArray[np.int64], Array, Array]:
-        """As `Follower` has it."""
+        """As `Tracker` has it."""
         return np.arange(len(self._mean)) + 1, self._mean.copy(), self._P.copy()
 
     def reach(self) -> Array:
-        """As `Follower` has it."""
+        """As `Tracker` has it."""
         return np.full(len(self._mean), -np.inf)
 
 
 class Ledger:
-    """Which detections went where: what `FollowedAnimals` is made of, kept while the tracks go on."""
+    """Which detections went where: what `TrackedAnimals` is made of, kept while the tracks go on."""
 
     def __init__(self, animals: int) -> None:
         self.found: list[Found] = []
@@ -245,13 +360,13 @@ class Ledger:
         self._own = np.zeros(animals, np.int64)
         self._after_last: dict[int, float] = {}
 
-    def take(self, image: int, follower: Follower, look: ImageLook, animals: Indices) -> None:
+    def take(self, image: int, tracker: Tracker, scan: ImageScan, animals: Indices) -> None:
         """Let the tracks have an image, and enter its detections; ``animals`` (M,) whose these are."""
         # First on to the image alone: a trace before it is one at its time.
-        follower.step(blind(look.time))
-        before = traces_of(follower)
-        names = follower.step(look)
-        self.enter(image, look.time, animals, names, before, traces_of(follower))
+        tracker.step(blind(scan.time))
+        before = traces_of(tracker)
+        names = tracker.step(scan)
+        self.enter(image, scan.time, animals, names, before, traces_of(tracker))
 
     def enter(
         self,
@@ -270,7 +385,7 @@ class Ledger:
             away = time - float(self._seen_at[animal]) if animal >= 0 else np.inf
             self.found.append(
                 Found(
-                    image, animal, name, name not in before, before.get(name, np.nan), after[name],
+                    image, animal, name, before.get(name, np.nan), after[name],
                     self._after_last.get(name, np.nan), before.get(int(own[animal]), np.nan),
                     int(own[animal]), away,
                 )
@@ -281,16 +396,16 @@ class Ledger:
             self._after_last[name] = after[name]
 
 
-def traces_of(follower: Follower) -> dict[int, float]:
+def traces_of(tracker: Tracker) -> dict[int, float]:
     """Trace of each track's covariance, m^2, by its number."""
-    identity, _, covariance = follower.known()
+    identity, _, covariance = tracker.known()
     return dict(zip(identity.tolist(), np.trace(covariance, axis1=1, axis2=2).tolist(), strict=True))
 
 
-def follow(
-    images: Images, terrain: Terrain, detector: Detector, follower: Follower, motion: Motion
-) -> FollowedAnimals:
-    """Take a follower through all images that can tell its tracks anything.
+def track_animals(
+    images: Images, terrain: Terrain, detector: Detector, tracker: Tracker, motion: Motion
+) -> TrackedAnimals:
+    """Take a tracker through all images that can tell its tracks anything.
 
     Parameters
     ----------
@@ -300,14 +415,14 @@ def follow(
         The ground.
     detector
         What the tracks take the camera for.
-    follower
+    tracker
         With its tracks; they are carried on.
     motion
         How fast an animal can leave its cloud.
 
     Returns
     -------
-    Followed
+    TrackedAnimals
     """
     times = images.times
     T = len(times)
@@ -322,43 +437,42 @@ def follow(
     steps, k, tells = 0, 0, True
     while k < T:
         steps += 1
-        look = look_at(terrain, images, k, (middle[k], float(radius[k])), detector)
+        scan = scan_at(terrain, images, k, (middle[k], float(radius[k])), detector)
         if detected[k]:
-            ledger.take(k, follower, look, images.taken(k)[2])
+            ledger.take(k, tracker, scan, images.taken(k)[2])
         else:
-            follower.step(look if tells else blind(look.time))
+            tracker.step(scan if tells else blind(scan.time))
         if stations[k]:
-            known.append(Known(k, *follower.known()))
-        k, tells = next_look(follower, k, times, middle, radius, detected | stations, motion)
-    tracks = max((one.track for one in ledger.found), default=0)
-    return FollowedAnimals(known, ledger.found, steps, tracks)
+            known.append(Known(k, *tracker.known()))
+        k, tells = next_scan(tracker, k, times, middle, radius, detected | stations, motion)
+    return TrackedAnimals(known, ledger.found, steps)
 
 
-def look_at(
+def scan_at(
     terrain: Terrain, images: Images, row: int, circle: tuple[Array, float], detector: Detector
-) -> ImageLook:
+) -> ImageScan:
     """What one of the images tells tracks; ``circle`` is that of its footprint."""
     z, R, _ = images.taken(row)
     p = images.poses
     sight = sight_from(terrain, p.camera, p.p_nc[row], p.R_nc[row], circle, detector)
-    return ImageLook(float(images.times[row]), z, R, sight)
+    return ImageScan(float(images.times[row]), z, R, sight)
 
 
-def blind(time: float) -> ImageLook:
+def blind(time: float) -> ImageScan:
     """An image that shows nothing of the ground."""
-    return ImageLook(time, np.zeros((0, 2)), np.zeros((0, 2, 2)), lambda places: np.zeros(places.shape[:-1]))
+    return ImageScan(time, np.zeros((0, 2)), np.zeros((0, 2, 2)), lambda places: np.zeros(places.shape[:-1]))
 
 
-def next_look(
-    follower: Follower, k: int, times: Array, middle: Array, radius: Array, wanted: Mask,
+def next_scan(
+    tracker: Tracker, k: int, times: Array, middle: Array, radius: Array, wanted: Mask,
     motion: Motion,
 ) -> tuple[int, bool]:  # fmt: skip
     """The next image to be looked at, and whether what it does not show can tell a track anything."""
     ahead = np.flatnonzero(wanted[k + 1 :])
     last = k + 1 + int(ahead[0]) if len(ahead) else len(times)
     rows = np.arange(k + 1, min(last + 1, len(times)))
-    _, mean, _ = follower.known()
-    reach = follower.reach()
+    _, mean, _ = tracker.known()
+    reach = tracker.reach()
     able = np.isfinite(reach)
     if len(rows) and able.any():
         spread = float(np.sqrt(motion(float(times[rows[-1]] - times[k]))[1][0, 0]))
@@ -451,7 +565,7 @@ def patrol(
     lives: Indices,
     times: Array,
     truth: Array,
-    follower: Particles,
+    tracker: ParticleTracker,
     visits: Visits,
     rng: np.random.Generator,
 ) -> Patrolled:
@@ -472,7 +586,7 @@ def patrol(
         (T,) s, evenly spaced, of all images that there is time for.
     truth
         (T, A, 2) m.
-    follower
+    tracker
         Tracks; they are carried on, and know the same enclosures by the same numbers.
     visits
         Of the high-level planner.
@@ -490,8 +604,8 @@ def patrol(
     given_up, done = list[int](), np.full(len(lives), np.inf)
     sought, arrived, scanned = SEARCH, False, 0.0
     for k, time in enumerate(times.tolist()):
-        identity, mean, P = follower.known()
-        here_live, home = ~follower.herd.lost, follower.home
+        identity, mean, P = tracker.known()
+        here_live, home = ~tracker.lost, tracker.home
         counts = np.bincount(home[here_live & (home >= 0)], minlength=len(lives))[: len(lives)]
         done[np.isinf(done) & all_positioned(counts, lives)] = time
         while reached < len(way_points) and np.isfinite(done[area_of[reached]]):
@@ -518,23 +632,23 @@ def patrol(
         scanned += step if arrived else 0.0
         row = slice(k, k + 1)
         up = float(np.nan_to_num(terrain.heights_at(here[None]))[0]) + aircraft.height
-        told = camera_on_course(
+        nominal = camera_on_course(
             aircraft.camera, np.array([[*here, -up]]), [heading], aircraft.gimbal(times[row])
         )
-        true = displaced(told, [heading], off[row], turn[row])
+        true = displaced(nominal, [heading], off[row], turn[row])
         images = take_images(
-            terrain, told, true, np.array([heading]), times[row], truth[row], aircraft.errors,
+            terrain, nominal, true, np.array([heading]), times[row], truth[row], aircraft.errors,
             aircraft.detector, rng,
         )  # fmt: skip
-        middle, radius = footprint_circles(terrain, told)
-        look = look_at(terrain, images, 0, (middle[0], float(radius[0])), aircraft.detector)
-        ledger.take(k, follower, look, images.taken(0)[2])
-        if scanned > visits.patience and not follower.seen_now(goal):
-            follower.give_up(goal)
+        middle, radius = footprint_circles(terrain, nominal)
+        scan = scan_at(terrain, images, 0, (middle[0], float(radius[0])), aircraft.detector)
+        ledger.take(k, tracker, scan, images.taken(0)[2])
+        if scanned > visits.patience and not tracker.seen_now(goal):
+            tracker.give_up(goal)
             given_up.append(goal)
-        known.append(Known(k, *follower.known()))
+        known.append(Known(k, *tracker.known()))
         goals.append(goal)
-        path.append(told.p_nc[0])
+        path.append(nominal.p_nc[0])
     flown = len(goals)
     return Patrolled(
         times[:flown], np.array(path).reshape(-1, 3), np.array(goals, np.int64), known, ledger.found,

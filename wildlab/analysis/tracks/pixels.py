@@ -1,7 +1,7 @@
 """One target of a flight through the tracking filters of H 6 and 7, and the tracks beside the truth.
 
-A `Sighting` holds what one camera saw of one target, with the poses of one navigation source: the filters see
-the same detections, and a comparison of sources is a comparison of sightings.
+`PixelMeasurements` are of one camera and target, with the poses of one navigation source: the filters see
+the same detections, and a comparison of sources is one of these.
 """
 
 from __future__ import annotations
@@ -32,10 +32,9 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.tracking.batch import BatchCamera, run_batch
-from wildlab.tracking.initiation import start_from_first
+from wildlab.tracking.kalman import Considered
 from wildlab.tracking.motion import Motion, constant_velocity
-from wildlab.tracking.run import Start, Track
-from wildlab.tracking.schmidt import Considered
+from wildlab.tracking.run import Start, Track, start_from_first
 from wildlab.tracking.sensors import POSE, Sensor, pixels
 
 #: The velocity of the truth is taken over this time: from one fix of a single-frequency receiver to the next,
@@ -43,7 +42,7 @@ from wildlab.tracking.sensors import POSE, Sensor, pixels
 TRUTH_VELOCITY_OVER_S = 10.0
 
 
-class Sighting(NamedTuple):
+class PixelMeasurements(NamedTuple):
     """N frames of one camera, from the first to the last that shows the target.
 
     Frames without a detection, or without a pose, have NaN; they are there because the process noise of H
@@ -73,7 +72,7 @@ class Sighting(NamedTuple):
     truth: Array
 
     @property
-    def seen(self) -> NDArray[np.bool_]:
+    def detected(self) -> NDArray[np.bool_]:
         """(N,) whether the frame has a detection that lies on the ground."""
         return np.asarray(np.isfinite(self.positions).all(axis=1))
 
@@ -102,7 +101,7 @@ class CvTuning(NamedTuple):
         return partial(constant_velocity, sd_acceleration=self.acceleration)
 
 
-def sighting(flight: Flight, source: str, target: str | None = None) -> Sighting:
+def read_pixels(flight: Flight, source: str, target: str | None = None) -> PixelMeasurements:
     """What the camera saw of a target, with the poses of a ``nav`` source.
 
     Parameters
@@ -116,7 +115,7 @@ def sighting(flight: Flight, source: str, target: str | None = None) -> Sighting
 
     Returns
     -------
-    Sighting
+    PixelMeasurements
 
     Raises
     ------
@@ -126,7 +125,7 @@ def sighting(flight: Flight, source: str, target: str | None = None) -> Sighting
     Examples
     --------
     >>> from wildlab.simulation.twins import simulate_twin
-    >>> seen = sighting(simulate_twin("large-ship", 1), "autopilot")
+    >>> seen = read_pixels(simulate_twin("large-ship", 1), "autopilot")
     >>> seen.uv.shape == (len(seen.times), 2)
     True
     """
@@ -158,7 +157,7 @@ def sighting(flight: Flight, source: str, target: str | None = None) -> Sighting
         manifest.geometry_camera(), manifest.geometry_mount(poses_name), p_nb, R_nb, pan, tilt, covariance
     )
     uv = np.full((len(times), 2), np.nan)
-    # Over terrain a ray that meets no ground is no sighting: whatever plane it were put on would be invented.
+    # Over terrain a ray that meets no ground is no measurement: its plane would be invented.
     met = np.isfinite(seen.plane_down) if seen.terrain is not None else np.ones(len(row), bool)
     uv[row - first] = np.where(met[:, None], seen.uv, np.nan)
     plane = np.full(len(times), np.nan)
@@ -174,7 +173,7 @@ def sighting(flight: Flight, source: str, target: str | None = None) -> Sighting
         raise WildlabError(
             "none of the detections lies on the ground", "does the source cover the flight?", field="nav"
         )
-    return Sighting(times, uv, positions, poses, plane, truth_states(flight, name, times))
+    return PixelMeasurements(times, uv, positions, poses, plane, truth_states(flight, name, times))
 
 
 def truth_states(flight: Flight, target: str, times: ArrayLike) -> Array:
@@ -193,18 +192,18 @@ def truth_states(flight: Flight, target: str, times: ArrayLike) -> Array:
     return np.hstack([where(at), (where(at + half) - where(at - half)) / (2 * half)])
 
 
-def start(seen: Sighting, tuning: CvTuning, n: int = 4, **more: float) -> Start:
+def start(seen: PixelMeasurements, tuning: CvTuning, n: int = 4, **more: float) -> Start:
     """On the first georeferenced detection, with zero speed (H 6.2.4, 6.3.3); see `start_from_first`."""
     return start_from_first(seen.times, seen.positions, tuning.position_0, tuning.velocity_0, n, **more)
 
 
-def follow_positions(seen: Sighting, tuning: CvTuning) -> Track:
+def track_positions(seen: PixelMeasurements, tuning: CvTuning) -> Track:
     """The Kalman filter on georeferenced detections, H 6.2.
 
     Parameters
     ----------
     seen
-        From `sighting`.
+        From `read_pixels`.
     tuning
         Its ``pixel`` is not used.
 
@@ -216,35 +215,35 @@ def follow_positions(seen: Sighting, tuning: CvTuning) -> Track:
     Examples
     --------
     >>> from wildlab.simulation.twins import simulate_twin
-    >>> seen = sighting(simulate_twin("large-ship", 1), "autopilot")
-    >>> track = follow_positions(seen, CvTuning(0.1, 10.0, 5.0, 10.0, 2.0))
+    >>> seen = read_pixels(simulate_twin("large-ship", 1), "autopilot")
+    >>> track = track_positions(seen, CvTuning(0.1, 10.0, 5.0, 10.0, 2.0))
     >>> track.x.shape == (len(seen.times), 4)
     True
     """
     return _compiled(seen, seen.positions, np.eye(2) * tuning.measurement**2, tuning, None, None)
 
 
-def follow_pixels(seen: Sighting, tuning: CvTuning) -> Track:
+def track_pixels(seen: PixelMeasurements, tuning: CvTuning) -> Track:
     """The extended Kalman filter on pixels, H 6.3; poses are taken as true.
 
     Parameters
     ----------
     seen
-        From `sighting`.
+        From `read_pixels`.
     tuning
         Its ``measurement`` is not used.
 
     Returns
     -------
     Track
-        (N, 4) states as from `follow_positions`; innovations in pixels.
+        (N, 4) states as from `track_positions`; innovations in pixels.
     """
     view = BatchCamera(seen.poses, seen.plane_down)
     return _compiled(seen, seen.uv, np.eye(2) * tuning.pixel**2, tuning, view, None)
 
 
-def follow_schmidt(
-    seen: Sighting,
+def track_schmidt(
+    seen: PixelMeasurements,
     tuning: CvTuning,
     covariance: ArrayLike | None = None,
 ) -> Track:
@@ -253,7 +252,7 @@ def follow_schmidt(
     Parameters
     ----------
     seen
-        From `sighting`.
+        From `read_pixels`.
     tuning
         Its ``measurement`` is not used.
     covariance
@@ -262,7 +261,7 @@ def follow_schmidt(
     Returns
     -------
     Track
-        As from `follow_pixels`.
+        As from `track_pixels`.
 
     Raises
     ------
@@ -280,15 +279,15 @@ def follow_schmidt(
 
 
 #: The filters of H by name: on pixels with the poses' uncertainty considered, on pixels, on the ground.
-FILTERS: dict[str, Callable[[Sighting, CvTuning], Track]] = {
-    "schmidt": follow_schmidt,
-    "ekf": follow_pixels,
-    "kf": follow_positions,
+FILTERS: dict[str, Callable[[PixelMeasurements, CvTuning], Track]] = {
+    "schmidt": track_schmidt,
+    "ekf": track_pixels,
+    "kf": track_positions,
 }
 
 
 def _compiled(
-    seen: Sighting,
+    seen: PixelMeasurements,
     z: Array,
     R: Array,
     tuning: CvTuning,
@@ -313,7 +312,9 @@ class Scored(NamedTuple):
     numbers: dict[str, float]
 
 
-def evaluate_track(seen: Sighting, track: Track, axes: tuple[str, str] = ("north", "east")) -> Scored:
+def evaluate_track(
+    seen: PixelMeasurements, track: Track, axes: tuple[str, str] = ("north", "east")
+) -> Scored:
     """Compare a track with the truth at every frame since its start, as the thesis does.
 
     The truth is taken for exact, as in H 7.5; where it comes from a receiver of its own, that receiver's
@@ -327,7 +328,7 @@ def evaluate_track(seen: Sighting, track: Track, axes: tuple[str, str] = ("north
     Parameters
     ----------
     seen
-        From `sighting`.
+        From `read_pixels`.
     track
         What a filter made of it.
     axes
@@ -354,7 +355,7 @@ def evaluate_track(seen: Sighting, track: Track, axes: tuple[str, str] = ("north
         "fraction_nis_inside": share_inside(track.nis, bounds),
     }
     distance = np.hypot(*(seen.truth - state)[:, :2].T)
-    known, measured = np.flatnonzero(np.isfinite(values)), np.isfinite(distance) & seen.seen
+    known, measured = np.flatnonzero(np.isfinite(values)), np.isfinite(distance) & seen.detected
     band = average(values, 2, _worth(values[known]))
     numbers |= {
         "error_at_end": float(distance[known[-1]]) if len(known) else math.nan,
@@ -375,7 +376,7 @@ def _worth(values: Array) -> float:
     return max(1.0, effective_sample_size(values, len(values) - 1))
 
 
-def evaluate_measurements(seen: Sighting) -> dict[str, float]:
+def evaluate_measurements(seen: PixelMeasurements) -> dict[str, float]:
     """The georeferenced detections themselves: mean error (truth minus measurement) and mean distance, m.
 
     Also the autocorrelation of their errors from one detection to the next.
@@ -383,14 +384,14 @@ def evaluate_measurements(seen: Sighting) -> dict[str, float]:
     Parameters
     ----------
     seen
-        From `sighting`.
+        From `read_pixels`.
 
     Returns
     -------
     dict
         By name.
     """
-    e = (seen.truth[:, :2] - seen.positions)[seen.seen]
+    e = (seen.truth[:, :2] - seen.positions)[seen.detected]
     return {
         "mean_north": float(np.nanmean(e[:, 0])),
         "mean_east": float(np.nanmean(e[:, 1])),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +16,6 @@ from wildlab.geometry.georeference import ground_to_pixel, pixel_rays
 from wildlab.geometry.terrain import Terrain, intersect_terrain
 from wildlab.geometry.uncertainty import PoseErrors, ground_covariance
 from wildlab.geometry.viewsheds import lines_clear
-from wildlab.tracking.particles.clouds import Sight
 
 #: Further than this from the camera nothing is looked for, m: where its image shows the horizon.
 FURTHEST = 150.0
@@ -23,6 +23,9 @@ FURTHEST = 150.0
 ABOVE = 0.05
 #: By how much a circle about a footprint is wider than its corners need.
 WIDER = 1.2
+
+#: Places (..., 2) m -> probability that an image has a detection of an animal that is there.
+Sight = Callable[[Array], Array]
 
 
 class Detector(NamedTuple):
@@ -60,7 +63,7 @@ class Images(NamedTuple):
     image
         (D,) which image each is in, ascending.
     animal
-        (D,) whose each is, which the tracks are not told; -1 for a detection of no animal.
+        (D,) whose each is, which the tracks are not nominal; -1 for a detection of no animal.
     truth
         (T, A, 2) m.
     in_view
@@ -100,7 +103,7 @@ def pose_errors(errors: ExecutionErrors, sd: float, R_nc: Array, headings: Array
     sd
         Of detections, px.
     R_nc
-        (N, 3, 3) attitudes of the camera, in whose own axes errors of the attitude are told.
+        (N, 3, 3) attitudes of the camera, in whose own axes errors of the attitude are nominal.
     headings
         (N,) of the platform, rad.
 
@@ -158,7 +161,7 @@ def shown(
 
 def take_images(
     terrain: Terrain,
-    told: CameraPoses,
+    nominal: CameraPoses,
     true: CameraPoses,
     headings: Array,
     times: ArrayLike,
@@ -173,7 +176,7 @@ def take_images(
     ----------
     terrain
         The ground.
-    told, true
+    nominal, true
         Poses as they are known, and as they are; T rows.
     headings
         (T,) of the platform, rad.
@@ -182,7 +185,7 @@ def take_images(
     truth
         (T, A, 2) m.
     errors
-        Of the told poses, which each detection's covariance follows from.
+        Of the nominal poses, which each detection's covariance follows from.
     detector
         What becomes of an animal in an image.
     rng
@@ -204,7 +207,7 @@ def take_images(
     if len(image):
         z, R = put_on_ground(
             terrain,
-            told.take(image),
+            nominal.take(image),
             true.take(image),
             headings[image],
             places[image, animal],
@@ -212,12 +215,12 @@ def take_images(
             detector,
             rng,
         )
-    return Images(np.asarray(times, float), told, z, R, image, animal, places, in_view)
+    return Images(np.asarray(times, float), nominal, z, R, image, animal, places, in_view)
 
 
 def put_on_ground(
     terrain: Terrain,
-    told: CameraPoses,
+    nominal: CameraPoses,
     true: CameraPoses,
     headings: Array,
     places: Array,
@@ -232,12 +235,12 @@ def put_on_ground(
     points = np.column_stack([places, -terrain.heights_at(places) - detector.height])
     uv = ground_to_pixel(true.camera, points, true.p_nc, true.R_nc)
     uv = uv + detector.sd * rng.standard_normal(uv.shape)
-    return to_ground(terrain, told, headings, uv, errors, detector, rng)
+    return to_ground(terrain, nominal, headings, uv, errors, detector, rng)
 
 
 def to_ground(
     terrain: Terrain,
-    told: CameraPoses,
+    nominal: CameraPoses,
     headings: Array,
     uv: Array,
     errors: ExecutionErrors,
@@ -250,10 +253,10 @@ def to_ground(
     """
     # Rays from a camera so much lower meet the ground where middles above it are looked at.
     up = np.array([0.0, 0.0, detector.height])
-    rays = pixel_rays(told.camera, uv, told.R_nc)
-    met = intersect_terrain(terrain, rays, told.p_nc + up).points - up
+    rays = pixel_rays(nominal.camera, uv, nominal.R_nc)
+    met = intersect_terrain(terrain, rays, nominal.p_nc + up).points - up
     R = ground_covariance(
-        told, uv, met[:, 2], pose_errors(errors, detector.sd, told.R_nc, headings), rng
+        nominal, uv, met[:, 2], pose_errors(errors, detector.sd, nominal.R_nc, headings), rng
     ).covariance
     return met[:, :2], R
 
