@@ -19,7 +19,7 @@ ELSEWHERE = re.compile(r"^\s*(?:https?:)?//")
 
 
 #: What stands for the modules that no room offers: one with models, whose manual is not here, and another.
-ALSO = ("wildlab.flight.manifest_parts", "wildlab.analysis.tracks.tracker", "wildlab.errors")
+ALSO = ("wildlab.flight.manifest", "wildlab.analysis.tracks.tracker", "wildlab.errors")
 
 
 @pytest.fixture(scope="module")

@@ -99,8 +99,7 @@ def check(flight: Path, as_json: bool, accept: bool) -> None:
       wildlab check --accept flights/tuesday    after a change that was meant
     """
     from wildlab.flight.checks.check import check_flight, usable_for
-    from wildlab.flight.checksums import accept_changes
-    from wildlab.flight.store import load_flight
+    from wildlab.flight.store import accept_changes, load_flight
 
     if accept:
         changed = accept_changes(flight)

@@ -12,8 +12,8 @@ from wildlab.analysis.tracks.noise_model import NoiseModel, model_noise, setting
 from wildlab.analysis.tracks.scans import Scans, scans_of
 from wildlab.analysis.tracks.scores import score_tracks
 from wildlab.analysis.tracks.tracker import TrackingResult
+from wildlab.flight.manifest import parse_settings
 from wildlab.flight.store import Flight
-from wildlab.flight.tracking_settings import parse_settings
 
 
 def boat(t: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ from tests.analysis.robots import boat, joined, paused, robot, robot_flight, row
 from wildlab.analysis.tracks.scans import SLOTS, predict_scan, scans_of, truths_at
 from wildlab.analysis.tracks.scores import compare_sensors, estimates_table, worth_of_errors, write_estimates
 from wildlab.analysis.tracks.tracker import track
-from wildlab.flight.tracking_settings import Settings
+from wildlab.flight.manifest import Settings
 
 # --- a heading that is off ----------------------------------------------------------------------------------
 

@@ -17,7 +17,7 @@ from wildlab.analysis.tracks.scans import Scans, Truth, sensor_of
 from wildlab.analysis.tracks.scores import estimates_table, score_tracks, seen_of, used_of
 from wildlab.analysis.tracks.single_target import SensorTrack, ends_of, track_target
 from wildlab.analysis.tracks.tracker import TrackingResult
-from wildlab.flight.tracking_settings import parse_settings
+from wildlab.flight.manifest import parse_settings
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix

@@ -13,7 +13,7 @@ from tests.refused import refused
 from wildlab.analysis.tracks import tracker
 from wildlab.analysis.tracks.scores import _between
 from wildlab.analysis.tracks.tuning import read_tuned, refuse_same, tune_flight, tuned_text
-from wildlab.flight.tracking_settings import parse_settings
+from wildlab.flight.manifest import parse_settings
 from wildlab.tracking.motion import white_acceleration
 
 

@@ -13,7 +13,7 @@ from tests.refused import refused
 from wildlab.analysis.navigate import navigate_mekf, navigate_observer
 from wildlab.analysis.navigation_inputs import imu_noise
 from wildlab.flight.clocks import poses_at
-from wildlab.flight.manifest_parts import ImuPart
+from wildlab.flight.manifest import ImuPart
 from wildlab.flight.schema import COVARIANCE_COLUMNS, LEVER_COLUMNS, SECOND_COLUMNS
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import matrix_to_rotation_vector

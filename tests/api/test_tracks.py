@@ -29,8 +29,8 @@ from wildlab.api.tracks import FEW_INDEPENDENT, Consistency
 from wildlab.evaluation.consistency import Average, chi_square_interval
 from wildlab.flight.clocks import poses_at
 from wildlab.flight.files import check_model
+from wildlab.flight.manifest import Settings, parse_settings
 from wildlab.flight.store import Flight
-from wildlab.flight.tracking_settings import Settings, parse_settings
 from wildlab.geometry.frames import matrix_to_quaternion
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.twins import simulate, simulate_twin

@@ -10,8 +10,14 @@ from click.testing import CliRunner
 from wildlab.cli import wildlab
 from wildlab.errors import WildlabError
 from wildlab.flight.checks.check import check_flight
-from wildlab.flight.checksums import accept_changes, manifest_changed, with_checksums
-from wildlab.flight.store import Flight, load_flight, save_flight
+from wildlab.flight.store import (
+    Flight,
+    accept_changes,
+    load_flight,
+    manifest_changed,
+    save_flight,
+    with_checksums,
+)
 from wildlab.geometry.terrain import Terrain
 
 

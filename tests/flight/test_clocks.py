@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from tests.analysis.survey_twin import Survey, simulate
 from wildlab.analysis.georeference import observe
 from wildlab.errors import WildlabError
-from wildlab.flight.checks.sightings import sightings
+from wildlab.flight.checks.known_points import sightings
 from wildlab.flight.clocks import (
     MAX_GAP_S,
     covariance_columns,

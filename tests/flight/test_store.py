@@ -16,10 +16,9 @@ import wildlab.flight.store as store
 from tests.flight.conftest import fault
 from wildlab.errors import WildlabError
 from wildlab.flight import files
-from wildlab.flight.checksums import accept_changes
 from wildlab.flight.files import Strict, check_model, parse_toml, read_regular
 from wildlab.flight.schema import TABLES, conform
-from wildlab.flight.store import Flight, load_flight, save_flight
+from wildlab.flight.store import Flight, accept_changes, load_flight, save_flight
 from wildlab.geometry.terrain import Terrain
 
 

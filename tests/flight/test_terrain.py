@@ -15,8 +15,7 @@ from rasterio.transform import Affine
 from rasterio.windows import Window
 
 from wildlab.errors import WildlabError
-from wildlab.flight.manifest import make_manifest, replace_in_manifest
-from wildlab.flight.manifest_parts import TerrainSays
+from wildlab.flight.manifest import TerrainSays, make_manifest, replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.flight.terrain import lay_terrain
 from wildlab.geometry.frames import geodetic_to_ned
@@ -165,7 +164,7 @@ def test_heights_count_from_what_is_said(tmp_path, flown):
     for file, says, words in (
         (path, {"heights": None}, "heights count from"),
         (egm, {}, "EGM96 height"),
-        (egm, {"heights": None}, "the grid"),
+        (egm, {"heights": None}, "whose grid"),
     ):
         with pytest.raises(WildlabError, match=words):
             lay(flown(), file, **says)

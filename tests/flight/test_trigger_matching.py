@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import linear_sum_assignment
 
 from wildlab.errors import WildlabError
-from wildlab.flight.trigger_matching import _pair, match_triggers
+from wildlab.flight.clock_fitting import _pair, match_triggers
 
 
 def flown(rng: np.random.Generator, lines: int = 6, each: int = 30, interval: float = 2.0) -> np.ndarray:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import dump_toml
-from wildlab.flight.tracking_settings import parse_settings
+from wildlab.flight.manifest import parse_settings
 from wildlab.sharing.names import QUARTER, Names, neutral_settings, whole_quarters
 
 TOLD = """

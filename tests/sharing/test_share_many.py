@@ -20,8 +20,8 @@ from tests.analysis.robots import robot_flight
 from tests.sharing.left import everything, leave_report
 from tests.sharing.test_share import assert_no_copy
 from wildlab.errors import RunFailed
+from wildlab.flight.manifest import read_settings
 from wildlab.flight.store import Flight, load_flight, save_flight
-from wildlab.flight.tracking_settings import read_settings
 from wildlab.reporting.metrics import metric
 from wildlab.runner.processes.scheduling import Outcome
 from wildlab.runner.track import MANY_NOTEBOOK as NOTEBOOK

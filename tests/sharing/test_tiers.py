@@ -11,9 +11,8 @@ from pyproj import Geod
 
 from tests.sharing.canary import canary
 from wildlab.errors import WildlabError
-from wildlab.flight.checksums import accept_changes, confirmed_locations, with_checksums
-from wildlab.flight.manifest import FILE_NAME, manifest_toml, read_manifest
-from wildlab.flight.manifest_parts import LocationsPart
+from wildlab.flight.manifest import FILE_NAME, LocationsPart, manifest_toml, read_manifest
+from wildlab.flight.store import accept_changes, confirmed_locations, with_checksums
 from wildlab.sharing.tiers import (
     TIERS,
     cell_of,

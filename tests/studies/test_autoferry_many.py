@@ -10,7 +10,7 @@ import pytest
 
 from wildlab.evaluation.identities import Moment, compare_identities
 from wildlab.flight.files import dump_toml
-from wildlab.flight.tracking_settings import parse_settings
+from wildlab.flight.manifest import parse_settings
 from wildlab.studies import autoferry_many
 from wildlab.studies.autoferry_many import Tuned, anees_of, draw, order
 

@@ -15,7 +15,7 @@ from wildlab.analysis import Fact, fact
 from wildlab.detection.boards import Board, find_board, grey8
 from wildlab.errors import WildlabError
 from wildlab.flight.calibration_files import BoardPart, CameraFile, EvidencePart, ParameterPart, ViewPart
-from wildlab.flight.manifest_parts import CameraPart
+from wildlab.flight.manifest import CameraPart
 from wildlab.flight.readers.frames.image import file_name, read_image
 from wildlab.geometry.frames import Array, Mask
 from wildlab.geometry.intrinsics import (

@@ -41,8 +41,8 @@ from wildlab.evaluation.consistency import Average, nees, position_nees
 from wildlab.evaluation.errors import summarise_track, track_errors
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.files import check_model
+from wildlab.flight.manifest import Settings, read_settings
 from wildlab.flight.store import Flight
-from wildlab.flight.tracking_settings import Settings, read_settings
 from wildlab.summary_table import Brief, Summary
 
 Array = NDArray[np.float64]

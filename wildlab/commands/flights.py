@@ -140,7 +140,7 @@ def _wishes(raw: tuple[Path, ...], out: Path | None, wishes: dict[str, Any]) -> 
     from wildlab.flight.calibration_files import read_camera
     from wildlab.flight.card.importing import safe_name
     from wildlab.flight.card.proposal import Wishes
-    from wildlab.flight.time_scales import find_zone
+    from wildlab.flight.units import find_zone
 
     start = None
     if wishes["start"] is not None:
@@ -166,7 +166,7 @@ def _wishes(raw: tuple[Path, ...], out: Path | None, wishes: dict[str, Any]) -> 
 
 
 def _say(card: Proposal, as_json: bool) -> None:
-    from wildlab.flight.card.description import HEADINGS, rows_of, sentences_of
+    from wildlab.flight.card.importing import HEADINGS, rows_of, sentences_of
 
     rows = rows_of(card.choices)
     said = [stopped(one) for one in (*sentences_of(card.choices), *card.notes)]

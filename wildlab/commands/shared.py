@@ -17,7 +17,7 @@ from wildlab.paths import REPORTS
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from wildlab.flight.manifest_parts import TerrainSays
+    from wildlab.flight.manifest import TerrainSays
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -130,7 +130,7 @@ def terrain_of(map_: Path | None, stated: Mapping[str, Any], prefix: str) -> Ter
         Where an option is there without a map, or its value is wrong.
     """
     from wildlab.flight.files import check_model
-    from wildlab.flight.manifest_parts import TerrainSays
+    from wildlab.flight.manifest import TerrainSays
 
     given = {name.removeprefix("terrain_"): one for name, one in stated.items() if one is not None}
     if map_ is None:

@@ -11,8 +11,7 @@ from pydantic import Field, model_validator
 from wildlab.errors import WildlabError, system_error
 from wildlab.files import write_atomic
 from wildlab.flight.files import Strict, check_model, dump_toml, parse_toml, read_toml
-from wildlab.flight.manifest import Manifest
-from wildlab.flight.manifest_parts import CameraPart, MountPart, Spread
+from wildlab.flight.manifest import CameraPart, Manifest, MountPart, Spread
 
 WHAT = "what `wildlab camera` wrote"
 Count = Annotated[int, Field(ge=0)]

@@ -20,8 +20,7 @@ from scipy.interpolate import RegularGridInterpolator
 from scipy.ndimage import map_coordinates
 
 from wildlab.errors import WildlabError
-from wildlab.flight.manifest import replace_in_manifest
-from wildlab.flight.manifest_parts import TerrainPart, TerrainSays
+from wildlab.flight.manifest import TerrainPart, TerrainSays, replace_in_manifest
 from wildlab.flight.readers.terrain import ElevationMap, Heights, open_elevation
 from wildlab.flight.store import MOST_NODES, Flight
 from wildlab.geometry.frames import Origin, geodetic_to_ned, ned_to_geodetic

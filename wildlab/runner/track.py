@@ -20,8 +20,8 @@ from wildlab.analysis.tracks.tracker import refuse_unusable, sensors_with_detect
 from wildlab.analysis.tracks.tuning import refuse_same, tune_flight, tuned_text
 from wildlab.errors import WildlabError
 from wildlab.flight.files import dump_toml
+from wildlab.flight.manifest import Settings, read_settings
 from wildlab.flight.store import Flight, load_flight
-from wildlab.flight.tracking_settings import Settings, read_settings
 from wildlab.paths import NOTEBOOKS, REPORTS
 from wildlab.runner.catalogue import StudyEntry, load_studies
 from wildlab.runner.evaluate import refuse_other_flight, refuse_study_name, tell_source

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 from wildlab.errors import WildlabError
 from wildlab.files import sha256
-from wildlab.flight.checksums import manifest_changed, verify
 from wildlab.flight.manifest import FILE_NAME, read_manifest
+from wildlab.flight.store import manifest_changed, verify
 from wildlab.runner.record.digests import (
     AGAIN,
     BEFORE_DIGESTS,

@@ -21,11 +21,9 @@ from wildlab.analysis.image_coverage import ground_height
 from wildlab.errors import WildlabError
 from wildlab.flight.calibration_files import Learnt
 from wildlab.flight.clocks import poses_at
-from wildlab.flight.manifest import Manifest, make_manifest
-from wildlab.flight.manifest_parts import CameraPart, MagnetometerPart
+from wildlab.flight.manifest import CameraPart, MagnetometerPart, Manifest, SensorPart, make_manifest
 from wildlab.flight.schema import COVARIANCE_COLUMNS
 from wildlab.flight.store import Flight
-from wildlab.flight.tracking_settings import SensorPart
 from wildlab.geometry.frames import Array, ned_to_geodetic
 from wildlab.geometry.gravity import Earth, local_earth
 from wildlab.navigation.magnetometer import earth_field

@@ -14,9 +14,9 @@ import pandas as pd
 
 from wildlab.analysis.navigate import REFERENCES
 from wildlab.errors import WildlabError
+from wildlab.flight.manifest import Settings, TargetsPart
 from wildlab.flight.schema import NAV, TABLES
 from wildlab.flight.store import PREFERRED
-from wildlab.flight.tracking_settings import Settings, TargetsPart
 
 #: Names that say what a thing is and nothing of where: wildlab's own, and those of kinds of sensors. Poses
 #: that a report looks up by name keep it: by another name they would be held against another reference.

@@ -11,10 +11,9 @@ from rich.console import Console
 from wildlab.errors import RunFailed, WildlabError
 from wildlab.files import write_atomic
 from wildlab.flight.calibration_files import Learnt, parse_learnt, read_learnt, write_calibration
-from wildlab.flight.checksums import CALIBRATION
 from wildlab.flight.files import dump_toml
-from wildlab.flight.store import Flight, save_flight
-from wildlab.flight.tracking_settings import parse_settings
+from wildlab.flight.manifest import parse_settings
+from wildlab.flight.store import CALIBRATION, Flight, save_flight
 from wildlab.paths import NOTEBOOKS
 from wildlab.reporting.own_flights import OwnFlight
 from wildlab.runner.evaluate import evaluate_flight

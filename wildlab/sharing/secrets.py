@@ -17,9 +17,8 @@ import pandas as pd
 
 from wildlab.errors import WildlabError
 from wildlab.flight.heights import undulation
-from wildlab.flight.manifest import Manifest
+from wildlab.flight.manifest import Manifest, parse_settings
 from wildlab.flight.store import Flight
-from wildlab.flight.tracking_settings import parse_settings
 from wildlab.geometry.frames import Array, ned_to_geodetic
 from wildlab.geometry.gravity import normal_gravity
 from wildlab.paths import ROOT

@@ -11,9 +11,8 @@ from rich.console import Console
 
 from wildlab.errors import RunFailed, WildlabError
 from wildlab.files import write_atomic
-from wildlab.flight.checksums import confirmed_locations
 from wildlab.flight.manifest import FILE_NAME
-from wildlab.flight.store import Flight, load_flight
+from wildlab.flight.store import Flight, confirmed_locations, load_flight
 from wildlab.messages.catalogue import Day, Language, load_language
 from wildlab.paths import NOTEBOOKS, REPORTS
 from wildlab.runner.catalogue import load_studies

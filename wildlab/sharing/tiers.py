@@ -14,7 +14,7 @@ from pydantic import Field, model_validator
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import Strict, check_model, read_toml
-from wildlab.flight.manifest_parts import LocationsPart
+from wildlab.flight.manifest import LocationsPart
 from wildlab.messages.catalogue import fill, load_texts
 from wildlab.paths import DATA
 

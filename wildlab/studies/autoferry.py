@@ -29,8 +29,8 @@ from wildlab.analysis.tracks.scores import score_track, seen_of
 from wildlab.analysis.tracks.single_target import SensorTrack, track_target
 from wildlab.analysis.tracks.tuning import tune
 from wildlab.evaluation.consistency import position_nees
+from wildlab.flight.manifest import read_settings
 from wildlab.flight.store import Flight
-from wildlab.flight.tracking_settings import read_settings
 from wildlab.geometry.frames import Array
 from wildlab.paths import DATA
 from wildlab.reporting.charts.drawing import draw_way, finish, mark_level

@@ -13,8 +13,8 @@ from wildlab.analysis.tracks.many import score_identities, track_jointly
 from wildlab.analysis.tracks.noise_model import SensorTuning
 from wildlab.evaluation.identities import Identities
 from wildlab.flight.files import check_model, read_toml
+from wildlab.flight.manifest import Settings
 from wildlab.flight.store import Flight
-from wildlab.flight.tracking_settings import Settings
 from wildlab.paths import DATA
 from wildlab.reporting.many_tracks import LARGEST, SMALLEST, rms_error
 from wildlab.reporting.report import Report

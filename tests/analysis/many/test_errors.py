@@ -30,8 +30,8 @@ from wildlab.analysis.tracks.ground_positions import (
 )
 from wildlab.analysis.tracks.many import track_jointly
 from wildlab.analysis.tracks.scans import scans_of
+from wildlab.flight.manifest import parse_settings
 from wildlab.flight.store import Flight
-from wildlab.flight.tracking_settings import parse_settings
 from wildlab.geometry.frames import euler_to_matrix, matrix_to_rotation_vector, rotation_vector_to_matrix
 from wildlab.geometry.uncertainty import PoseErrors
 from wildlab.simulation.twins import simulate_twin

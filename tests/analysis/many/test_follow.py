@@ -13,7 +13,7 @@ from wildlab.analysis.tracks.many import (
     track_jointly,
     tracks_table,
 )
-from wildlab.flight.tracking_settings import parse_settings
+from wildlab.flight.manifest import parse_settings
 
 
 def test_a_boat_among_clutter_is_found_without_its_name():

@@ -10,7 +10,7 @@ import pytest
 from wildlab.flight.card.importing import import_card, read_card
 from wildlab.flight.card.proposal import Wishes
 from wildlab.flight.readers.log import RawLog, make_stream
-from wildlab.flight.recipe.quantities import LogTable
+from wildlab.flight.recipe.model import LogTable
 from wildlab.flight.recipe.raw import log_part
 from wildlab.flight.store import Flight
 

@@ -9,8 +9,7 @@ import pymap3d
 import pytest
 from scipy.spatial.transform import Rotation
 
-from wildlab.flight.checks.known_points import judge
-from wildlab.flight.checks.sightings import SightingGeometry, Sightings
+from wildlab.flight.checks.known_points import SightingGeometry, Sightings, judge
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel

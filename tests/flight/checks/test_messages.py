@@ -6,8 +6,7 @@ from pathlib import Path
 import pytest
 
 from wildlab.flight import checks
-from wildlab.flight.checks.findings import messages, phrase
-from wildlab.flight.checks.mistakes import rows_of
+from wildlab.flight.checks.findings import messages, phrase, rows_of
 
 SOURCES = "".join(path.read_text(encoding="utf-8") for path in Path(checks.__path__[0]).glob("*.py"))
 #: Codes that are put together from a word and an end.

@@ -11,7 +11,7 @@ from tests.flight.checks.test_mistakes_named import NAV, euler
 from wildlab.flight.checks import known_points
 from wildlab.flight.checks.check import check_flight, usable_for
 from wildlab.flight.checks.findings import Finding
-from wildlab.flight.checks.sightings import sightings
+from wildlab.flight.checks.known_points import sightings
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.simulation.twins import simulate_twin

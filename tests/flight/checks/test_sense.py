@@ -5,18 +5,18 @@ import pandas as pd
 import pytest
 
 from tests.analysis.survey_twin import Survey, simulate
-from wildlab.flight.checks import mistakes, motion, sensors, tables
+from wildlab.flight.checks import findings, motion, sensors, tables
 from wildlab.flight.checks.attitude import Felt, FieldStep, felt_mistakes, field_mistakes
-from wildlab.flight.checks.mistakes import attitude_mistakes, axes_words, other_axes, place_mistakes
-from wildlab.flight.checks.sightings import sightings
+from wildlab.flight.checks.findings import attitude_mistakes, axes_words, other_axes, place_mistakes
+from wildlab.flight.checks.known_points import sightings
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.simulation.twins import simulate_twin
 
 ORIGIN = (np.radians(63.4), np.radians(10.4), 40.0)
 
 
-def _mistake(cause: str, factor: float) -> mistakes.Mistake[float]:
-    return mistakes.Mistake(cause, cause, cause, lambda x: x * factor, cause == "fitted")
+def _mistake(cause: str, factor: float) -> findings.Mistake[float]:
+    return findings.Mistake(cause, cause, cause, lambda x: x * factor, cause == "fitted")
 
 
 @pytest.mark.parametrize(
@@ -30,7 +30,7 @@ def _mistake(cause: str, factor: float) -> mistakes.Mistake[float]:
 )
 def test_which_mistakes_are_named(factors, named):
     ways = [_mistake(cause, factor) for cause, factor in factors.items()]
-    found = mistakes.explain(lambda x: np.full((2, 3), x), 4.0, ways)
+    found = findings.explain(lambda x: np.full((2, 3), x), 4.0, ways)
     assert [one.cause for one in found] == named
 
 
@@ -45,7 +45,7 @@ def test_which_mistakes_are_named(factors, named):
     ],
 )
 def test_what_is_far_better(before, after, better):
-    assert mistakes.far_better(np.full((2, 3), before), np.array([after] * 2)) == better
+    assert findings.far_better(np.full((2, 3), before), np.array([after] * 2)) == better
 
 
 def test_every_attitude_mistake_gives_rotations():

@@ -8,8 +8,7 @@ from tests.flight.checks.test_mistakes_named import NAV, euler, shift
 from tests.sound_flights import simulate_sound_flight, sound_flights
 from wildlab.flight.checks.attitude import Felt, heading_error
 from wildlab.flight.checks.check import find
-from wildlab.flight.checks.findings import Finding
-from wildlab.flight.checks.mistakes import state
+from wildlab.flight.checks.findings import Finding, state
 from wildlab.flight.store import Flight
 from wildlab.simulation.twins import simulate_twin
 

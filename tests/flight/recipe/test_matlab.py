@@ -12,9 +12,9 @@ import scipy.io
 
 from wildlab.errors import WildlabError
 from wildlab.files import sha256
-from wildlab.flight.recipe import source_files
-from wildlab.flight.recipe.quantities import MatlabTable
-from wildlab.flight.recipe.source_files import read_matlab, table_of
+from wildlab.flight.recipe import raw
+from wildlab.flight.recipe.model import MatlabTable
+from wildlab.flight.recipe.raw import read_matlab, table_of
 
 HERE = Path("log.mat")
 
@@ -102,7 +102,7 @@ def test_a_damaged_file_is_one_sentence(mat):
 
 
 def test_a_small_file_that_unpacks_to_a_huge_one(monkeypatch):
-    monkeypatch.setattr(source_files, "MOST_BYTES", 1 << 22)
+    monkeypatch.setattr(raw, "MOST_BYTES", 1 << 22)
     bomb = zlib.compress(bytes(1 << 24))
     assert len(bomb) < 1 << 15
     with pytest.raises(WildlabError, match="4 MiB"):

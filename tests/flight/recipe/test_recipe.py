@@ -17,11 +17,10 @@ from scipy.spatial.transform import Rotation
 from tests.flight.recipe.comparing import near
 from wildlab.errors import WildlabError
 from wildlab.flight.checks.check import check_flight
-from wildlab.flight.checksums import accept_changes
 from wildlab.flight.clocks import covariances
-from wildlab.flight.recipe.quantities import Attitude
+from wildlab.flight.recipe.model import Attitude
 from wildlab.flight.recipe.tables import _rotation
-from wildlab.flight.store import Flight, load_flight
+from wildlab.flight.store import Flight, accept_changes, load_flight
 from wildlab.flight.units import UNITS, factor
 from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
 from wildlab.runner.track import track_many

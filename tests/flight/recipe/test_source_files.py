@@ -10,10 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wildlab.errors import WildlabError
-from wildlab.flight.recipe import source_files
-from wildlab.flight.recipe.quantities import Quantity
-from wildlab.flight.recipe.raw import RawTable, numbers, plain_numbers, texts
-from wildlab.flight.recipe.source_files import packed, read_delimited
+from wildlab.flight.recipe import raw
+from wildlab.flight.recipe.model import Quantity
+from wildlab.flight.recipe.raw import RawTable, numbers, packed, plain_numbers, read_delimited, texts
 
 CELLS = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=6)
 
@@ -26,11 +25,11 @@ def test_blocks_and_whole_say_the_same(rows, block):
     text = written.getvalue()
     reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True)
     expected = [([cell.strip() for cell in row], reader.line_num) for row in reader][1:]
-    before, source_files.BLOCK = source_files.BLOCK, block
+    before, raw.BLOCK = raw.BLOCK, block
     try:
         header, cells, lines = read_delimited(Path("t.csv"), text.encode(), ",")
     finally:
-        source_files.BLOCK = before
+        raw.BLOCK = before
     assert header == ("a", "b", "c")
     assert [list(row) for row in zip(*(cells[name].to_pylist() for name in header), strict=True)] == [
         row for row, _ in expected
@@ -39,7 +38,7 @@ def test_blocks_and_whole_say_the_same(rows, block):
 
 
 def test_numbers_over_several_blocks(monkeypatch):
-    monkeypatch.setattr(source_files, "BLOCK", 2)
+    monkeypatch.setattr(raw, "BLOCK", 2)
     text = "t,x\n1,0.1\n2,1e-3\n3,\n4,7\n5, -8 \n"
     table = RawTable(Path("t.csv"), *read_delimited(Path("t.csv"), text.encode(), ","))
     np.testing.assert_array_equal(plain_numbers(table, "t", "p"), [1, 2, 3, 4, 5])

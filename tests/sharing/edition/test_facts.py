@@ -11,7 +11,7 @@ from tests.sharing.edition.flights import flight, overview, report
 from wildlab.analysis.tracks.scores import score_tracks
 from wildlab.analysis.tracks.tracker import track
 from wildlab.analysis.verdict import numbers_of
-from wildlab.flight.tracking_settings import parse_settings
+from wildlab.flight.manifest import parse_settings
 from wildlab.reporting import tracking
 from wildlab.reporting.metrics import read_metrics
 from wildlab.reporting.report import open_report

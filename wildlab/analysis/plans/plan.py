@@ -22,7 +22,7 @@ from wildlab.analysis.plans.request import (
 )
 from wildlab.analysis.plans.sorties import HeightProfile, Sortie, clear_of, split_rows
 from wildlab.errors import WildlabError
-from wildlab.flight.manifest_parts import TerrainSays
+from wildlab.flight.manifest import TerrainSays
 from wildlab.flight.readers.vector import Area, Areas, read_areas
 from wildlab.flight.terrain import CutOut, terrain_about
 from wildlab.geometry.frames import Array, geodetic_to_ned, ned_to_geodetic

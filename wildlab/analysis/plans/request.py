@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from wildlab.errors import WildlabError
-from wildlab.flight.manifest_parts import TerrainSays
+from wildlab.flight.manifest import TerrainSays
 from wildlab.flight.readers.vector import Area, crossing, ring_area
 from wildlab.flight.writers import Heights, Vehicle
 from wildlab.geometry.camera import Camera

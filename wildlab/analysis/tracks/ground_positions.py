@@ -35,8 +35,8 @@ from wildlab.analysis.tracks.noise_model import (
 )
 from wildlab.analysis.tracks.scans import PLACEABLE, PLACED, SLOTS, Scans, predict_scan
 from wildlab.errors import WildlabError
+from wildlab.flight.manifest import SensorPart
 from wildlab.flight.store import Flight
-from wildlab.flight.tracking_settings import SensorPart
 from wildlab.geometry.attitude_uncertainty import level_axes
 from wildlab.geometry.camera import in_image, project
 from wildlab.geometry.frames import Array

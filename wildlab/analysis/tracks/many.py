@@ -27,13 +27,13 @@ from wildlab.analysis.tracks.tracker import read_inputs
 from wildlab.errors import WildlabError
 from wildlab.evaluation.identities import Identities, compare_identities
 from wildlab.evaluation.identities import Moment as Compared
-from wildlab.flight.store import Flight
-from wildlab.flight.tracking_settings import (
+from wildlab.flight.manifest import (
     ManyTargetsPart,
     SensorPart,
     Settings,
     read_settings,
 )
+from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
 from wildlab.paths import DATA
 from wildlab.tracking.many import (

@@ -18,8 +18,7 @@ from scipy.spatial import cKDTree
 from wildlab.analysis.georeference import assumed_deviations
 from wildlab.analysis.tracks.scans import SLOTS, Scans, Truth
 from wildlab.errors import WildlabError
-from wildlab.flight.store import Flight
-from wildlab.flight.tracking_settings import (
+from wildlab.flight.manifest import (
     CONSIDERED,
     SensorPart,
     Settings,
@@ -27,6 +26,7 @@ from wildlab.flight.tracking_settings import (
     read_settings,
     settings_over,
 )
+from wildlab.flight.store import Flight
 from wildlab.geometry.attitude_uncertainty import level_axes
 from wildlab.geometry.frames import Array, wrap
 from wildlab.paths import DATA
@@ -199,7 +199,7 @@ class NoiseModel(NamedTuple):
 
 
 class TargetModel(NamedTuple):
-    """Of the targets, see `wildlab.flight.tracking_settings.TargetsPart`; some lengths may be NaN."""
+    """Of the targets, see `wildlab.flight.manifest.TargetsPart`; some lengths may be NaN."""
 
     density: float
     start_speed_m_s: float

@@ -36,8 +36,8 @@ from wildlab.analysis.tracks.single_target import (
 )
 from wildlab.errors import WildlabError
 from wildlab.flight.checks.sensors import looks_of_others
+from wildlab.flight.manifest import Settings, absent_sensors
 from wildlab.flight.store import Flight
-from wildlab.flight.tracking_settings import Settings, absent_sensors
 
 #: What a target is called of which nobody says a name.
 UNNAMED = "target"

@@ -39,8 +39,8 @@ from wildlab.analysis.tracks.single_target import choose
 from wildlab.analysis.tracks.tracker import read_inputs
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import effective_sample_size
+from wildlab.flight.manifest import Settings
 from wildlab.flight.store import Flight
-from wildlab.flight.tracking_settings import Settings
 from wildlab.geometry.frames import Array
 from wildlab.tracking.run import Start, run_filter
 from wildlab.tracking.sensors import Merged, head

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.flight.card.roles import QUARTER_S, CardItem, quarters_ahead, span_of
+from wildlab.flight.clock_fitting import match_triggers
 from wildlab.flight.files import printable
-from wildlab.flight.manifest_parts import CameraPart
+from wildlab.flight.manifest import CameraPart
 from wildlab.flight.readers.log import Stream
 from wildlab.flight.readers.photos import camera_of, of_camera
-from wildlab.flight.time_scales import Span
-from wildlab.flight.trigger_matching import match_triggers
+from wildlab.flight.units import Span
 
 
 class ImageClock(NamedTuple):

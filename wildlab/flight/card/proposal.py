@@ -21,7 +21,7 @@ from wildlab.flight.card.images import camera_of_images, clock_of_images, one_ca
 from wildlab.flight.card.roles import OTHER, PARTS_SHOWN, ROLES, Choice, has_place
 from wildlab.flight.files import dump_toml, printable, read_toml
 from wildlab.flight.heights import NO_GRID, HeightPlan, HeightUse, choose_reference
-from wildlab.flight.manifest_parts import CameraPart
+from wildlab.flight.manifest import CameraPart
 from wildlab.flight.readers.log import Stream
 from wildlab.paths import DATA
 

@@ -24,7 +24,7 @@ from wildlab.flight.readers.formats import FOLDERS, FORMATS, HEAD, read_folder, 
 from wildlab.flight.readers.frames.image import SUFFIXES
 from wildlab.flight.readers.log import RawLog, Stream
 from wildlab.flight.recipe.raw import RAW_LIMIT
-from wildlab.flight.time_scales import Span
+from wildlab.flight.units import Span
 from wildlab.geometry.frames import geodetic_to_ned
 from wildlab.names import listed
 

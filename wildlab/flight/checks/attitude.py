@@ -12,20 +12,12 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from wildlab.flight.checks.findings import POSITION, QUATERNION, VELOCITY, Finding, finite_rows, thin
-from wildlab.flight.checks.inertial import (
-    FORCE,
-    RATE,
-    Inertial,
-    airframe_sources,
-    attitudes_near,
-    fixes,
-    increasing_rows,
-    moves,
-    samples,
-)
-from wildlab.flight.checks.mistakes import (
+from wildlab.flight.checks.findings import (
+    POSITION,
+    QUATERNION,
+    VELOCITY,
     Change,
+    Finding,
     Misfit,
     Mistake,
     alternate,
@@ -39,11 +31,24 @@ from wildlab.flight.checks.mistakes import (
     compare,
     crosswise,
     explain,
+    finite_rows,
     mistake,
     one_row,
     other_axes,
     rows_of,
+    thin,
     undo_in,
+)
+from wildlab.flight.checks.inertial import (
+    FORCE,
+    RATE,
+    Inertial,
+    airframe_sources,
+    attitudes_near,
+    fixes,
+    increasing_rows,
+    moves,
+    samples,
 )
 from wildlab.flight.store import Flight
 from wildlab.flight.units import other_units

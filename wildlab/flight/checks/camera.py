@@ -13,16 +13,20 @@ from wildlab.flight.checks.findings import (
     POSITION,
     Finding,
     Level,
+    Mistake,
     bad_rows,
+    blame,
+    change_by,
     finite_rows,
     messages,
+    mistake,
     phrase,
+    rows_of,
     thin,
 )
-from wildlab.flight.checks.mistakes import Mistake, blame, change_by, mistake, rows_of
-from wildlab.flight.checks.sightings import MOST
+from wildlab.flight.checks.known_points import MOST
 from wildlab.flight.clocks import frame_poses, frame_times, gimbal_angles, poses_at
-from wildlab.flight.manifest_parts import CameraPart
+from wildlab.flight.manifest import CameraPart
 from wildlab.flight.schema import DETECTION_KINDS
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera_poses import CameraPoses

@@ -10,10 +10,9 @@ import numpy as np
 
 from wildlab.flight.checks.attitude import field, forces, heading
 from wildlab.flight.checks.camera import ground, image, lens, terrain_findings
-from wildlab.flight.checks.findings import Finding, Level, say
+from wildlab.flight.checks.findings import Finding, Level, report_alone, say
 from wildlab.flight.checks.inertial import inertial, why_no_start
 from wildlab.flight.checks.known_points import known_points
-from wildlab.flight.checks.mistakes import report_alone
 from wildlab.flight.checks.motion import distinguish_leaps, motion, origin, positions, together
 from wildlab.flight.checks.sensors import scans, sensors, targets
 from wildlab.flight.checks.tables import (
@@ -27,9 +26,8 @@ from wildlab.flight.checks.tables import (
     truth_place,
     values,
 )
-from wildlab.flight.checksums import locations_confirmed, manifest_changed
 from wildlab.flight.clocks import covariances
-from wildlab.flight.store import Flight
+from wildlab.flight.store import Flight, locations_confirmed, manifest_changed
 from wildlab.names import listed
 
 __all__ = ["Finding", "Use", "check_flight", "find", "sense_sentences", "usable_for"]

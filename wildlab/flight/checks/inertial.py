@@ -19,8 +19,19 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 from scipy.spatial.transform import Rotation
 
-from wildlab.flight.checks.findings import POSITION, QUATERNION, VELOCITY, Finding, Level, finite_rows, say
-from wildlab.flight.checks.mistakes import APART, Correction, change_columns, shift_clock
+from wildlab.flight.checks.findings import (
+    APART,
+    POSITION,
+    QUATERNION,
+    VELOCITY,
+    Correction,
+    Finding,
+    Level,
+    change_columns,
+    finite_rows,
+    say,
+    shift_clock,
+)
 from wildlab.flight.clocks import gnss_times
 from wildlab.flight.schema import SECOND_COLUMNS
 from wildlab.flight.store import Flight

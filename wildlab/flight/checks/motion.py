@@ -17,19 +17,12 @@ from scipy.integrate import cumulative_trapezoid
 
 from wildlab.errors import WildlabError
 from wildlab.flight.checks.findings import (
+    LEAP,
     POSE,
     POSITION,
     VELOCITY,
     Finding,
     Level,
-    finite_rows,
-    part_of,
-    thin,
-)
-from wildlab.flight.checks.inertial import fixes, increasing_rows, intervals
-from wildlab.flight.checks.known_points import LONGEST_LEVER, best_of
-from wildlab.flight.checks.mistakes import (
-    LEAP,
     Misfit,
     Mistake,
     blame,
@@ -37,16 +30,21 @@ from wildlab.flight.checks.mistakes import (
     change_columns,
     compare,
     crosswise,
+    finite_rows,
     mistake,
     one_row,
+    part_of,
     place_mistakes,
     places_in,
     raise_by,
     rows_of,
     shift_clock,
     shift_poses,
+    thin,
     undo_in,
 )
+from wildlab.flight.checks.inertial import fixes, increasing_rows, intervals
+from wildlab.flight.checks.known_points import LONGEST_LEVER, best_of
 from wildlab.flight.clocks import poses_at
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array, Origin, geodetic_to_ned, ned_to_geodetic

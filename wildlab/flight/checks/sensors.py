@@ -14,10 +14,12 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.checks.findings import POSITION, Finding, Level, thin
-from wildlab.flight.checks.mistakes import (
+from wildlab.flight.checks.findings import (
     ALIKE,
     FAR_BETTER_ALONE,
+    POSITION,
+    Finding,
+    Level,
     Misfit,
     Mistake,
     blame,
@@ -28,11 +30,12 @@ from wildlab.flight.checks.mistakes import (
     one_row,
     place_mistakes,
     rows_of,
+    thin,
     undo_in,
 )
 from wildlab.flight.clocks import frame_times, poses_at, truth_at
+from wildlab.flight.manifest import Settings, absent_sensors
 from wildlab.flight.store import Flight
-from wildlab.flight.tracking_settings import Settings, absent_sensors
 from wildlab.geometry.frames import Array, wrap
 from wildlab.names import listed
 

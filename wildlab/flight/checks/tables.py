@@ -26,7 +26,7 @@ from wildlab.flight.clocks import covariances, frame_times, gnss_times, longest_
 from wildlab.flight.files import printable
 from wildlab.flight.schema import NAV, TABLES, Table, extra_columns
 from wildlab.flight.store import Flight
-from wildlab.flight.time_scales import Span
+from wildlab.flight.units import Span
 from wildlab.geometry.frames import Array
 
 #: Truth further from every pose than this belongs to another flight, or has its coordinates exchanged.

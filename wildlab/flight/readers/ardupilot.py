@@ -39,7 +39,7 @@ from wildlab.flight.readers.log import (
 )
 from wildlab.flight.readers.text import percent
 from wildlab.flight.schema import BOUNDS
-from wildlab.flight.time_scales import week_to_utc
+from wildlab.flight.units import week_to_utc
 
 #: Fixes are written down by a loop that runs so often, s, at its slowest.
 LOOP_S = 0.02

@@ -41,7 +41,7 @@ from wildlab.flight.readers.log import (
     named,
 )
 from wildlab.flight.readers.text import calendar_s, decode, number, numbers, plural, stamp_s
-from wildlab.flight.time_scales import WEEK_S, wall_to_utc, week_to_utc
+from wildlab.flight.units import WEEK_S, wall_to_utc, week_to_utc
 
 #: What is said of a clock without a zone.
 NO_ZONE = "local time without a zone"

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from wildlab.flight.clock_fitting import ClockFit
 from wildlab.flight.readers.text import LATEST_S, plural
 from wildlab.flight.schema import BOUNDS
-from wildlab.flight.time_scales import GPS_START_S
+from wildlab.flight.units import GPS_START_S
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

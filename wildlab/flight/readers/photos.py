@@ -41,7 +41,7 @@ from wildlab.flight.readers.frames.thermal import (
 )
 from wildlab.flight.readers.log import ANGLES, WORLD, Array, Clock, Decoded, RawLog, Readings, any_of, named
 from wildlab.flight.readers.text import LATEST_S, plural, stamp_s
-from wildlab.flight.time_scales import wall_to_utc
+from wildlab.flight.units import wall_to_utc
 
 #: Bytes of XMP that are looked through.
 MOST_XMP = 1_000_000

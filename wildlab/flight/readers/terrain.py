@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from wildlab.errors import WildlabError
 from wildlab.files import sha256
 from wildlab.flight.files import printable, regular_size
-from wildlab.flight.manifest_parts import UNITS, TerrainSays
+from wildlab.flight.manifest import UNITS, TerrainSays
 
 if TYPE_CHECKING:
     from pyproj import CRS

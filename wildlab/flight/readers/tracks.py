@@ -46,7 +46,7 @@ from wildlab.flight.readers.log import (
     named,
 )
 from wildlab.flight.readers.text import number, numbers, parse_xml, plural, stamp_s
-from wildlab.flight.time_scales import GPS_START_S, WEEK_S, gps_to_utc, week_to_utc
+from wildlab.flight.units import GPS_START_S, WEEK_S, gps_to_utc, week_to_utc
 from wildlab.geometry.attitude_uncertainty import tilt_from_roll_pitch
 
 # -- NMEA 0183

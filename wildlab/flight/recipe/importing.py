@@ -21,8 +21,15 @@ from wildlab.flight.calibration_files import parse_camera, read_learnt, refuse_o
 from wildlab.flight.checks.check import find
 from wildlab.flight.clocks import between, poses_at
 from wildlab.flight.files import TOML_LIMIT, check_model, inside
-from wildlab.flight.manifest import Manifest, make_manifest
-from wildlab.flight.manifest_parts import CameraPart, GnssPart, ImuPart, MagnetometerPart, TerrainSays
+from wildlab.flight.manifest import (
+    CameraPart,
+    GnssPart,
+    ImuPart,
+    MagnetometerPart,
+    Manifest,
+    TerrainSays,
+    make_manifest,
+)
 from wildlab.flight.recipe.model import Recipe, read_recipe
 from wildlab.flight.recipe.raw import RawFiles, nanoseconds, plain_numbers
 from wildlab.flight.recipe.tables import (

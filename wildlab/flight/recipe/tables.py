@@ -12,16 +12,21 @@ from numpy.typing import NDArray
 
 from wildlab.flight.checks.findings import NORM_TOLERANCE, POSITION, QUATERNION, VELOCITY
 from wildlab.flight.clocks import covariance_columns
-from wildlab.flight.recipe.model import Detections, FramesPart, Ground, Poses, Recipe, Truth
-from wildlab.flight.recipe.quantities import (
+from wildlab.flight.recipe.model import (
     FORMS,
     Attitude,
     Block,
+    Detections,
+    FramesPart,
+    Ground,
+    Poses,
     Position,
     Quantity,
+    Recipe,
     Satellite,
     Series,
     Spreads,
+    Truth,
     Velocity,
     YawFromBearing,
 )

@@ -18,14 +18,13 @@ import pyarrow.parquet
 
 from wildlab.errors import WildlabError
 from wildlab.files import csv_text, write_atomic
-from wildlab.flight.checksums import accept_changes
 from wildlab.flight.files import printable, read_regular, unreadable
 from wildlab.flight.manifest import FILE_NAME
 from wildlab.flight.readers.formats import read_log
 from wildlab.flight.readers.frames.image import SUFFIXES, file_name, images_below
 from wildlab.flight.readers.photos import is_photos, natural_key
 from wildlab.flight.schema import TABLES, conform
-from wildlab.flight.store import load_flight
+from wildlab.flight.store import accept_changes, load_flight
 
 #: Images of a folder, points in one image, letters of a name, and bytes of a table, at most.
 MOST_IMAGES, MOST_POINTS, MOST_LETTERS, MOST_BYTES = 200_000, 2000, 60, 50_000_000

@@ -16,9 +16,9 @@ from typing import Any
 from wildlab import __version__
 from wildlab.errors import WildlabError
 from wildlab.files import sha256
-from wildlab.flight.checksums import manifest_changed
 from wildlab.flight.files import flight_name
 from wildlab.flight.manifest import FILE_NAME
+from wildlab.flight.store import manifest_changed
 from wildlab.paths import LOCK, ROOT
 from wildlab.reporting.layout import ALERT
 from wildlab.reporting.text import escape
