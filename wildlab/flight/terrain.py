@@ -2,8 +2,7 @@
 
 A node of the grid at north N and east E has the height of the point of the map's surface that has these very
 coordinates in n. Where that lies in the map depends on how deep it is, a little: n's verticals are parallel,
-the Earth's are not. So its depth is sought by iteration, which gains three digits a turn. Going from n to
-the map is smooth; it is worked out on a lattice, at two depths, and linear between, and checked elsewhere.
+the Earth's are not. So its depth is sought by iteration, which gains three digits a turn, between two depths.
 """
 
 from __future__ import annotations
@@ -16,7 +15,6 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import RegularGridInterpolator
 from scipy.ndimage import map_coordinates
 
 from wildlab.errors import WildlabError
@@ -28,9 +26,6 @@ from wildlab.geometry.terrain import Terrain
 
 Array = NDArray[np.float64]
 
-#: Between nodes of the lattice, metres, at most; halved until the lattice is good to `GOOD` metres.
-LATTICE = 200.0
-GOOD = 0.002
 #: Nodes of the grid that are worked on at once.
 AT_ONCE = 1_000_000
 
@@ -97,72 +92,17 @@ def places_of(elevation: ElevationMap, origin: Origin, added: float) -> MapPlace
     return MapPlaces(elevation, origin, added, there.transform, back.transform)
 
 
-class Lattice(NamedTuple):
-    """`MapPlaces.of_points` of an even lattice at two depths, linear between its nodes: takes (N, 3) down,
-    north and east to columns, rows and heights."""
-
-    downs: tuple[float, float]
-    between: Callable[[Array], Array]
-
-    def at(self, level: int, north: Array, east: Array) -> Array:
-        """Columns, rows and heights (3, N) at one of the depths."""
-        return self.between(np.column_stack([np.full(len(north), self.downs[level]), north, east])).T
-
-
-def lattice_of(places: MapPlaces, extent: Extent, heights: tuple[float, float], cell: float) -> Lattice:
-    """A lattice over an extent for ground between two heights of the map, metres.
-
-    Parameters
-    ----------
-    places
-        The way from n to the map.
-    extent
-        In n.
-    heights
-        Lowest and highest, in the map.
-    cell
-        The map's cell, metres: by it columns are metres.
-
-    Returns
-    -------
-    Lattice
-        Linear between its nodes to `GOOD` metres, or as fine as is sensible.
-    """
+def depths_of(places: MapPlaces, extent: Extent, heights: tuple[float, float]) -> tuple[float, float]:
+    """Down (m) above and below all ground over an extent, whose heights in the map are the lowest and the
+    highest."""
     high = -(heights[1] + places.added - places.origin[2]) - 10.0
     # The ground falls behind the horizon: down grows by the square of the distance over twice the radius.
     far = max(map(abs, extent)) ** 2 / 6e6
-    downs = (high, -(heights[0] + places.added - places.origin[2]) + far + 10.0)
-    rng = np.random.default_rng(0)
-    trial = np.column_stack([rng.uniform(*extent[:2], 100), rng.uniform(*extent[2:], 100)])
-    spacing = LATTICE
-    while True:
-        lattice = _lattice(places, extent, downs, spacing)
-        worst = 0.0
-        for level, down in enumerate(downs):
-            exact = places.of_points(np.column_stack([trial, np.full(len(trial), down)]))
-            off = lattice.at(level, trial[:, 0], trial[:, 1]).T - exact
-            worst = max(worst, float(np.abs(off * [cell, cell, 1.0]).max()))
-        if worst <= GOOD or spacing < 20.0:
-            return lattice
-        spacing /= 2
-
-
-def _lattice(places: MapPlaces, extent: Extent, downs: tuple[float, float], spacing: float) -> Lattice:
-    e = extent
-    a, b = (int(np.ceil(side / spacing)) + 1 for side in (e.far_north - e.north, e.far_east - e.east))
-    north, east = np.linspace(e.north, e.far_north, max(a, 2)), np.linspace(e.east, e.far_east, max(b, 2))
-    N, E = np.meshgrid(north, east, indexing="ij")
-    levels = [
-        places.of_points(np.column_stack([N.ravel(), E.ravel(), np.full(N.size, down)])) for down in downs
-    ]
-    values = np.stack(levels).reshape(2, *N.shape, 3)
-    # What lies beyond the lattice is so by rounding alone.
-    between = RegularGridInterpolator((downs, north, east), values, bounds_error=False, fill_value=None)
-    return Lattice(downs, between)
+    return high, -(heights[0] + places.added - places.origin[2]) + far + 10.0
 
 
 def resample(
-    heights: Heights, corner: tuple[int, int], every: int, lattice: Lattice, extent: Extent, step: float
+    heights: Heights, corner: tuple[int, int], every: int, places: MapPlaces, extent: Extent, step: float
 ) -> Terrain:
     """The grid in n of a window of a map.
 
@@ -174,8 +114,8 @@ def resample(
         Row and column in the file of the window's first cell.
     every
         See `heights`.
-    lattice
-        The way to the map, over the extent at least.
+    places
+        The way to the map.
     extent
         Of the grid.
     step
@@ -190,27 +130,30 @@ def resample(
     columns = int(np.floor((extent.far_east - extent.east) / step)) + 1
     out = np.empty((rows, columns), np.float32)
     east = extent.east + step * np.arange(columns)
+    downs = depths_of(places, extent, (float(np.nanmin(heights)), float(np.nanmax(heights))))
     at_once = max(1, AT_ONCE // columns)
     for first in range(0, rows, at_once):
         north = extent.north + step * np.arange(first, min(first + at_once, rows))
         N, E = (grid.ravel() for grid in np.meshgrid(north, east, indexing="ij"))
-        out[first : first + len(north)] = _surface(heights, corner, every, lattice, N, E).reshape(-1, columns)
+        ends = [places.of_points(np.column_stack([N, E, np.full(N.size, down)])).T for down in downs]
+        out[first : first + len(north)] = _surface(heights, corner, every, ends, downs).reshape(-1, columns)
     return Terrain(out, extent.north, extent.east, step)
 
 
 def _surface(
-    heights: Heights, corner: tuple[int, int], every: int, lattice: Lattice, north: Array, east: Array
+    heights: Heights, corner: tuple[int, int], every: int, ends: list[Array], downs: tuple[float, float]
 ) -> Array:
-    """Heights in n (N,), metres above the plane ``down = 0``."""
-    top, bottom = (lattice.at(level, north, east) for level in (0, 1))
-    share = np.full(len(north), 0.5)
+    """Heights in n (N,), metres above the plane ``down = 0``, of verticals with ends (3, N) at two depths:
+    columns, rows and heights in the map, linear between."""
+    top, bottom = ends
+    share = np.full(top.shape[1], 0.5)
     for _ in range(3):
         column, row, _height = top + share * (bottom - top)
         found = bilinear(heights, (row - corner[0]) / every - 0.5, (column - corner[1]) / every - 0.5)
         share = (found - top[2]) / (bottom[2] - top[2])
         known = np.isfinite(share)
         share[~known] = 0.5
-    down = lattice.downs[0] + share * (lattice.downs[1] - lattice.downs[0])
+    down = downs[0] + share * (downs[1] - downs[0])
     return np.where(known, -down, np.nan)
 
 
@@ -397,9 +340,7 @@ def _cut_out(places: MapPlaces, positions: Array, margin: float, says: TerrainSa
             file=path,
             field="terrain",
         )
-    span = (float(np.nanmin(found)), float(np.nanmax(found)))
-    lattice = lattice_of(places, extent, span, max(cell))
-    terrain = _cropped(resample(found, (row, column), every, lattice, extent, step))
+    terrain = _cropped(resample(found, (row, column), every, places, extent, step))
     rms, largest = resampling_error(terrain, places, cells, values)
     # What is known of a height at a node is known no better between nodes.
     sd = math.hypot(says.sd_m, rms) if says.sd_m is not None else math.nan
