@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Collection, Mapping
-from functools import cache
-from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.log import Stream
@@ -17,15 +14,9 @@ from wildlab.names import listed
 
 Array = NDArray[np.float64]
 
-#: Grids of the geoid's height as PROJ names them, the first that is installed is used; what they are called.
-GRIDS = {
-    "us_nga_egm96_15.tif": "EGM96",
-    "egm96_15.gtx": "EGM96",
-    "us_nga_egm08_25.tif": "EGM2008",
-    "egm08_25.gtx": "EGM2008",
-}
-#: For messages where `undulation` is None.
-NO_GRID = "no grid of it (EGM96) is installed, which `projsync --file us_nga_egm96_15` fetches"
+#: Heights above the geoid of EGM96, and what to do where PROJ's grid of it is not there.
+EGM96 = "EPSG:4326+5773"
+NO_GRID = "no grid of EGM96 is installed (`projsync --file us_nga_egm96_15`)"
 #: The geoid is nowhere further from the ellipsoid than this, m.
 FARTHEST_M = 110.0
 #: A column of heights is there where so large a share of the rows used has it.
@@ -64,52 +55,31 @@ class HeightPlan(NamedTuple):
     without: tuple[str, ...] = ()
 
 
-def undulation(latitude_deg: ArrayLike, longitude_deg: ArrayLike) -> Array | None:
-    """Height of the geoid above the ellipsoid of WGS84, by PROJ's grid.
+def undulation(latitude_deg: float, longitude_deg: float, heights: Any = EGM96) -> float | None:
+    """How far that which heights count from is above the ellipsoid of WGS84 at a place, by a grid of PROJ.
 
     Parameters
     ----------
     latitude_deg, longitude_deg
-        (...) each, of WGS84.
+        Of WGS84.
+    heights
+        A CRS with heights.
 
     Returns
     -------
-    (...) m, NaN where the grid does not reach; None where no grid is installed. Nothing is fetched.
+    m; None where no grid is installed, or it does not reach there. Nothing is fetched.
     """
-    grid = installed_grid()
-    if grid is None:
-        return None
-    from pyproj import Transformer
+    from pyproj import CRS, Transformer
     from pyproj.exceptions import ProjError
 
-    steps = "+step +proj=unitconvert +xy_in=deg +xy_out=rad +step +proj=vgridshift +grids={} +multiplier=1 {}"
-    back = "+step +proj=unitconvert +xy_in=rad +xy_out=deg"
-    latitude, longitude = np.broadcast_arrays(
-        np.asarray(latitude_deg, float), np.asarray(longitude_deg, float)
-    )
+    crs = CRS.from_user_input(heights)
     try:
-        shift = Transformer.from_pipeline("+proj=pipeline " + steps.format(grid, back))
-        _, _, found = shift.transform(longitude, latitude, np.zeros(latitude.shape))
-    except ProjError:  # the file is there and is none
+        flat = Transformer.from_crs(CRS.from_epsg(4326), crs.to_2d(), always_xy=True)
+        up = Transformer.from_crs(crs, CRS.from_epsg(4979), always_xy=True, allow_ballpark=False)
+        found = float(up.transform(*flat.transform(longitude_deg, latitude_deg), 0.0)[2])
+    except ProjError:  # no grid, or a file that is none
         return None
-    heights = np.asarray(found, float)
-    if not np.isfinite(heights).any():
-        return None
-    return np.where(np.isfinite(heights) & (np.abs(heights) <= FARTHEST_M), heights, np.nan)
-
-
-def installed_grid() -> str | None:
-    """The file name of the first of `GRIDS` that PROJ finds on this machine, or None."""
-    from pyproj import datadir
-
-    folders = [*datadir.get_data_dir().split(os.pathsep), str(datadir.get_user_data_dir())]  # type: ignore[attr-defined]
-    return _found(tuple(folders))
-
-
-@cache
-def _found(folders: tuple[str, ...]) -> str | None:
-    there = (name for name in GRIDS if any((Path(folder) / name).is_file() for folder in folders if folder))
-    return next(there, None)
+    return found if np.isfinite(found) and abs(found) <= FARTHEST_M else None
 
 
 def choose_reference(
@@ -221,8 +191,7 @@ def _geoid(name: str, streams: Mapping[str, Stream], stated: float | None) -> tu
         good = np.isfinite(latitude) & np.isfinite(longitude)
         if good.any():
             grid = undulation(float(np.median(latitude[good])), float(np.median(longitude[good])))
-            if grid is not None and np.isfinite(grid):
-                return float(grid), f"of the grid {GRIDS[installed_grid() or 'egm96_15.gtx']}"
+            return None if grid is None else (grid, "of EGM96")
     return None
 
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from wildlab.errors import WildlabError
+from wildlab.flight.heights import undulation
 from wildlab.flight.manifest import TerrainPart, TerrainSays, replace_in_manifest
 from wildlab.flight.readers.terrain import ElevationMap, Heights, open_elevation
 from wildlab.flight.store import MOST_NODES, Flight
@@ -391,31 +392,16 @@ def _vertical(
             file=elevation.path,
             field="terrain.heights",
         )
-    return "geoid", _geoid_by_grid(elevation, flight)
-
-
-def _geoid_by_grid(elevation: ElevationMap, flight: Flight) -> float:
-    """How high the map's vertical datum is above the ellipsoid at the flight's origin, by a grid of PROJ."""
-    from pyproj import CRS, Transformer
-    from pyproj.exceptions import ProjError
-
     latitude, longitude, _ = flight.manifest.origin_tuple()
-    there = (math.degrees(longitude), math.degrees(latitude))
-    undulation = math.inf
-    try:
-        flat = Transformer.from_crs(CRS.from_epsg(4326), elevation.crs, always_xy=True)
-        up = Transformer.from_crs(elevation.whole, CRS.from_epsg(4979), always_xy=True, allow_ballpark=False)
-        undulation = float(up.transform(*flat.transform(*there), 0.0)[2])
-    except ProjError:
-        pass
-    if not math.isfinite(undulation):
+    geoid = undulation(math.degrees(latitude), math.degrees(longitude), elevation.whole)
+    if geoid is None:
         raise WildlabError(
             f"its heights count from {elevation.vertical!r}, whose grid is not installed",
             "state as heights how far that is above the ellipsoid",
             file=elevation.path,
             field="terrain.heights",
         )
-    return undulation
+    return "geoid", geoid
 
 
 def _above_ground(places: MapPlaces, poses: Array) -> Array:
