@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 from collections import Counter
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -259,32 +259,15 @@ def _in_other_looks(flight: Flight, detections: pd.DataFrame) -> Iterator[Findin
 
 #: Logs do not begin and end together: fewer frames outside than this share are good to know, no more.
 FEW_OUTSIDE = 0.02
-#: Logs that begin within so many seconds of each other, and end so, were switched on and off together.
-TOGETHER_S = 5.0
-#: More names, or gaps, than this are counted and not listed.
+#: More gaps than this are counted and not listed.
 LISTED = 5
 #: Share of the shorter that has to lie within the longer, and what it may be less while clocks are in doubt.
 WITHIN, DOUBT = 0.9, 0.5
 HOURS = tuple(float(h) for h in np.arange(-26.0, 26.25, 0.25) if h)
 
 
-class _Log(NamedTuple):
-    """Stamps of poses, or of the truth of a target, against the times of the frames."""
-
-    name: str
-    low: float
-    high: float
-    outside: NDArray[np.bool_]
-
-    @property
-    def level(self) -> Level:
-        if self.outside.all():
-            return "problem"
-        return "note" if self.outside.mean() < FEW_OUTSIDE else "warning"
-
-
 def overlap(flight: Flight) -> Iterator[Finding]:
-    """Whether poses, frames and truth are of the same time; truths that are outside alike are one finding."""
+    """Whether poses, frames and truth are of the same time."""
     frames = flight.frames
     if frames is None or len(frames) == 0:
         return
@@ -295,72 +278,33 @@ def overlap(flight: Flight) -> Iterator[Finding]:
             lost, first = ~ids.isin(nav["frame_id"]).to_numpy(), {"first": ids.to_numpy(object)}
             yield from bad_rows(lost, None, table, "frame_id", "frame-without-pose", first)
         else:
-            log = _against("poses", nav["time_s"].to_numpy(float), times)
-            if log is not None:
-                yield _outside(table, "the poses run", [log], times)
-    if flight.truth is None or flight.manifest.time.kind != "utc":
+            yield from _outside(table, {"poses": nav["time_s"].to_numpy(float)}, times)
+    if flight.truth is not None and flight.manifest.time.kind == "utc":
+        late = flight.manifest.clocks.truth_offset_s
+        targets = flight.truth.groupby("target_id", sort=False)["time_s"]
+        logs = {f"truth of {target!r}": stamps.to_numpy(float) + late for target, stamps in targets}
+        yield from _outside("truth", logs, times)
+
+
+def _outside(table: str, logs: dict[str, Array], times: Array) -> Iterator[Finding]:
+    """The log outside of which most frames are, and how many others have some outside."""
+    known, found = times[np.isfinite(times)], []
+    for name, stamps in logs.items():
+        if len(known) and np.isfinite(stamps).any():
+            low, high = float(np.nanmin(stamps)), float(np.nanmax(stamps))
+            outside = int((~((times >= low) & (times <= high))).sum())
+            if outside:
+                found.append((outside, name, low, high))
+    if not found:
         return
-    alike: list[list[_Log]] = []
-    for target, rows in flight.truth.groupby("target_id", sort=False):
-        stamps = rows["time_s"].to_numpy(float) + flight.manifest.clocks.truth_offset_s
-        log = _against(str(target), stamps, times)
-        if log is not None:
-            same = next((logs for logs in alike if _alike(logs[0], log)), None)
-            if same is None:
-                alike.append([log])
-            else:
-                same.append(log)
-    for logs in alike:
-        named = _listed([repr(one.name) for one in logs], " more")
-        yield _outside("truth", f"the truth of {named} runs", logs, times)
-
-
-def _against(name: str, stamps: Array, times: Array) -> _Log | None:
-    """A log outside of which there are frames; None where there are none, or nothing has a time."""
-    known = stamps[np.isfinite(stamps)]
-    if not (np.isfinite(times).any() and len(known)):
-        return None
-    low, high = float(known.min()), float(known.max())
-    outside = ~((times >= low) & (times <= high))
-    return _Log(name, low, high, outside) if outside.any() else None
-
-
-def _alike(one: _Log, other: _Log) -> bool:
-    near = abs(one.low - other.low) <= TOGETHER_S and abs(one.high - other.high) <= TOGETHER_S
-    return near and one.level == other.level
-
-
-def _outside(table: str, runs: str, logs: list[_Log], times: Array) -> Finding:
-    """What is said of logs that are outside alike."""
-    known = times[np.isfinite(times)]
+    n, name, low, high = max(found, key=lambda one: one[0])
     first, last = float(known.min()), float(known.max())
-    level = logs[0].level
-    most = max(logs, key=lambda one: int(one.outside.sum()))
-    late, early = max(most.low - first, 0.0), max(last - most.high, 0.0)
-    facts: dict[str, Any] = {
-        "runs": runs,
-        "from": _span([one.low for one in logs]),
-        "to": _span([one.high for one in logs]),
-        "first": first,
-        "last": last,
-        "several": len(logs) > 1,
-        "n": int(most.outside.sum()),
-        "of": len(times),
-        "late": late,
-        "early": early,
-    }
+    facts = {"log": name, "low": low, "high": high, "first": first, "last": last}
+    facts |= {"n": n, "of": len(times), "others": len(found) - 1}
+    facts |= {"late": max(low - first, 0.0), "early": max(last - high, 0.0)}
+    level: Level = "problem" if n == len(times) else "note" if n < FEW_OUTSIDE * len(times) else "warning"
     code = "times-apart" if level == "problem" else "times-outside"
-    return Finding(level, table, "time_s", code, facts)
-
-
-def _span(values: list[float]) -> str:
-    low, high = f"{min(values):.3f}", f"{max(values):.3f}"
-    return low if low == high else f"between {low} and {high}"
-
-
-def _listed(names: list[str], more: str) -> str:
-    rest = f" and {len(names) - LISTED}{more}" if len(names) > LISTED else ""
-    return ", ".join(names[:LISTED]) + rest
+    yield Finding(level, table, "time_s", code, facts)
 
 
 def gaps(flight: Flight) -> Iterator[Finding]:
@@ -384,7 +328,8 @@ def gaps(flight: Flight) -> Iterator[Finding]:
         spans = [f"{stamps[k]:.3f} s to {stamps[k + 1]:.3f} s" for k in np.unique(before[lost])]
         facts = {
             "what": "look" if "sensor" in frames else "frame",
-            "spans": _listed(spans, " more times"),
+            "spans": ", ".join(spans[:LISTED]),
+            "more": max(len(spans) - LISTED, 0),
             "without": without,
             "detections": 0 if detections is None else len(detections),
         }
