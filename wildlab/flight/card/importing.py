@@ -5,7 +5,6 @@ The recipe is text that a user can read and change.
 
 from __future__ import annotations
 
-import math
 import re
 import tempfile
 from collections import Counter
@@ -22,7 +21,7 @@ from wildlab.flight.card.proposal import Proposal, Wishes
 from wildlab.flight.card.roles import OTHER, ROLES, Choice, choose_roles, search, source_folder
 from wildlab.flight.files import is_safe_name, printable
 from wildlab.flight.manifest import TerrainSays
-from wildlab.flight.readers.log import Clock, Stream
+from wildlab.flight.readers.log import Stream
 from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.store import Flight
 
@@ -173,29 +172,8 @@ def sentences_of(choices: Sequence[Choice]) -> list[str]:
                 if part != "photos" and not rows.used.all()
             ]
             own += [*log.lost, *log.notes]
-            # Stamps that are UTC already were brought nowhere.
-            if (
-                log.clock is not None
-                and log.clock.pairs > 2
-                and (log.clock.rate != 1.0 or log.clock.spread_s > 0)
-            ):
-                own.append(_rate(log.clock))
         notes += [f"{name}: {printable(text)}" for text in own if text]
     return notes
-
-
-def _rate(clock: Clock) -> str:
-    """How a log's clock runs, as far as its pairs of stamps can tell."""
-    ppm, sd = 1e6 * (1 / clock.rate - 1), 1e6 * clock.rate_sd
-    runs = f"runs {abs(ppm):.0f} ppm {'fast' if ppm > 0 else 'slow'}"
-    if clock.rate == 1.0 or (not math.isnan(sd) and abs(ppm) < TOLD * sd):
-        runs = "cannot be told to run fast or slow" + (f" (to {TOLD * sd:.0f} ppm)" if 0.5 < sd < 1e6 else "")
-    spread = f"{1000 * clock.spread_s:.0f} ms ({1000 * clock.largest_s:.0f} at most)"
-    return f"its clock, by {clock.pairs} pairs of {clock.base}, {runs}; residuals {spread}"
-
-
-#: A rate differs from 1 where it is so many of its standard deviations away from it.
-TOLD = 2.0
 
 
 def _unused(part: str, stream: Stream) -> str:

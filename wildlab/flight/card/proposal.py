@@ -156,9 +156,7 @@ class Proposal:
     @property
     def recipe(self) -> str:
         """The recipe as TOML, with what it rests on in front."""
-        lines = [
-            "# Written by wildlab import. To change it: wildlab import THIS --source FOLDER --out FLIGHT"
-        ]
+        lines = ["# To change it: wildlab import THIS --source FOLDER --out FLIGHT"]
         for one in self.choices:
             if one.item.problem != OTHER:
                 role = one.role + (f" {one.target}" if one.target else "")
@@ -300,9 +298,7 @@ class Proposal:
         ]
         camera, how = camera_of_images(images.item, wishes.camera, wishes.focal_px)
         if camera is None:
-            self.notes.append(
-                f"The images are left out: {how}. Give the camera with --camera, or with --focal alone."
-            )
+            self.notes.append(f"The images are left out: {how}. Give --camera or --focal.")
             return
         data["camera"] = camera.model_dump()
         self.notes.append(f"The camera: {how}.")
@@ -364,9 +360,7 @@ class Proposal:
             )
         elif "gimbal" not in self.data:
             self.data["mount"] = {"looks": "down"}
-            self.notes.append(
-                "The camera is taken to look straight down, the top of its images forward: see [mount]."
-            )
+            self.notes.append("The camera is taken to look straight down: see [mount].")
 
     def _add_targets(self) -> None:
         """Truth: tracks of targets, and points that do not move."""
@@ -402,7 +396,7 @@ class Proposal:
     def _add_clicks(self, images: Choice | None) -> None:
         """What was clicked in the images."""
         if images is None or "frames" not in self.data:
-            self.notes.append("The pixels are left out: they are of no images.")
+            self.notes.append("The pixels are left out: no images.")
             return
         frames, clicks = self.data["frames"], self.by_role["clicks"]
         level = self._level()

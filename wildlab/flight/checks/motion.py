@@ -431,16 +431,13 @@ def origin(flight: Flight) -> Iterator[Finding]:
         return
     o, stated = flight.manifest.origin, flight.manifest.origin_tuple()
     here = ned_to_geodetic(at, stated)
-    ways = {}
-    for key, lat, lon in (
-        ("latitude and longitude of the origin exchanged", o.longitude_deg, o.latitude_deg),
-        ("latitude of the origin negated", -o.latitude_deg, o.longitude_deg),
-        ("longitude of the origin negated", o.latitude_deg, -o.longitude_deg),
-        ("latitude and longitude of the origin negated", -o.latitude_deg, -o.longitude_deg),
-    ):
+    ways: dict[str, str] = {}
+    for row in rows_of("origin"):
+        lat, lon = np.asarray(change_by(row)(np.array([o.latitude_deg, o.longitude_deg]))).tolist()
         there = (float(np.radians(lat)), float(np.radians(lon)), o.height_m)
         if abs(lat) <= 90 and _level(geodetic_to_ned(here[0], here[1], here[2], there)) < FAR_AWAY:
-            ways[key] = f"write `latitude_deg = {lat:g}, longitude_deg = {lon:g}` in [origin]"
+            way: Mistake[Array] = mistake(row, lambda x: x, lat=lat, lon=lon)
+            ways[way.cause] = way.fix
     shown = flight.manifest.locations.sensitivity == "open"
     facts = {
         "km": away / 1e3,

@@ -58,10 +58,6 @@ from wildlab.geometry.frames import (
 #: Takes a vector from forward-left-up to forward-right-down, and back.
 FLIP = np.diag([1.0, -1.0, -1.0])
 
-#: What became of standard deviations of angles, for the flight's description.
-AS_TILT_AND_HEADING = (
-    "The tilt of nav/{} is the root mean square of the SDs of roll and pitch, the heading that of yaw."
-)
 
 #: Rows that say the same of one frame agree to this, in metres or radians.
 SAME = 1e-9
@@ -245,8 +241,6 @@ def read_poses(recipe: Recipe, block: Poses, table: RawTable, part: str, ids: Te
         horizontal, vertical, tilt, heading = spreads.T
         P = pose_covariance(horizontal, vertical, tilt, heading, rotation)
         columns |= dict(covariance_columns(P))
-    if block.spreads is not None and block.spreads.tilt is None:
-        note = f"{note} {AS_TILT_AND_HEADING.format(part.removeprefix('poses.'))}".strip()
     return Rows(columns, stamps, position, ids, note)
 
 
