@@ -1,11 +1,10 @@
 """The parts of the sense checks by themselves: rule, pairs, bounds, each with a right and a wrong one."""
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from tests.analysis.survey_twin import Survey, simulate
-from wildlab.flight.checks import findings, motion, sensors, tables
+from wildlab.flight.checks import findings, motion, tables
 from wildlab.flight.checks.attitude import Felt, FieldStep, felt_mistakes, field_mistakes
 from wildlab.flight.checks.findings import attitude_mistakes, axes_words, other_axes, place_mistakes
 from wildlab.flight.checks.known_points import sightings
@@ -86,33 +85,6 @@ def test_however_well_attitudes_are_stated_the_camera_is_not_known_that_well():
     assert np.allclose(expected[2], np.radians(1.0))
 
 
-def _log(**changes: float) -> pd.DataFrame:
-    t = np.arange(0, 120.0)
-    v = np.column_stack([15 * np.cos(t / 9), 15 * np.sin(t / 9), 2 * np.sin(t / 5)])
-    p = np.column_stack([135 * np.sin(t / 9), -135 * np.cos(t / 9), -100 - 10 * np.cos(t / 5)])
-    table = pd.DataFrame(np.column_stack([t, p, v]))
-    table.columns = ["time_s", "north_m", "east_m", "down_m", "v_north_m_s", "v_east_m_s", "v_down_m_s"]
-    for name, factor in changes.items():
-        table[name] *= factor
-    return table
-
-
-@pytest.mark.parametrize(
-    ("table", "column", "value"),
-    [("imu", "w_x_rad_s", 500.0), ("imu", "f_z_m_s2", -9810.0), ("gnss", "v_east_m_s", 2000.0)],
-)
-def test_beyond_bounds_is_a_problem_with_row_and_value(make_flight, table, column, value):
-    flight = make_flight()
-    flight.tables["gnss"] = _log()
-    names = ["time_s", *(f"f_{a}_m_s2" for a in "xyz"), *(f"w_{a}_rad_s" for a in "xyz")]
-    flight.tables["imu"] = pd.DataFrame(np.zeros((20, 7)), columns=names)
-    assert list(tables.bounds(flight)) == []
-    flight.tables[table].loc[7, column] = value
-    (found,) = tables.bounds(flight)
-    assert (found.level, found.table, found.field) == ("problem", table, column)
-    assert f"row 7 with {value:g}" in found.sentence
-
-
 def test_a_degree_of_latitude_turns_level_by_a_degree():
     assert motion.turned(np.array([111_195.0, 0.0, 0.0]), ORIGIN) == pytest.approx(1.0, abs=0.02)
     # Along a parallel, north turns by the sine of the latitude and level by its cosine.
@@ -135,14 +107,6 @@ def test_whole_hours_between_stamps_are_a_zone(make_flight):
     assert found.table == "frames" and "2 h late" in found.sentence
     flight.tables["frames"]["time_s"] += 400.0  # no whole quarter of an hour
     assert list(tables.stamps(flight)) == []
-
-
-def test_a_target_seen_beside_its_truth():
-    beside = np.random.default_rng(4).normal([25, 0], 2, (60, 2))
-    offset, there, here = sensors.offset_of(beside)
-    assert offset == pytest.approx([25, 0], abs=1.5)
-    assert there > 0.9
-    assert here == 0
 
 
 def test_positions_that_stand_still_are_no_unit_of_speed():
