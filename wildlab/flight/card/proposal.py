@@ -19,7 +19,7 @@ import numpy as np
 from wildlab.errors import WildlabError
 from wildlab.flight.card.images import camera_of_images, clock_of_images, one_camera
 from wildlab.flight.card.roles import OTHER, PARTS_SHOWN, ROLES, Choice, has_place
-from wildlab.flight.files import dump_toml, printable, read_toml
+from wildlab.flight.files import dump_toml, read_toml
 from wildlab.flight.heights import NO_GRID, HeightPlan, HeightUse, choose_reference
 from wildlab.flight.manifest import CameraPart
 from wildlab.flight.readers.log import Stream
@@ -365,11 +365,10 @@ class Proposal:
     def _add_targets(self) -> None:
         """Truth: tracks of targets, and points that do not move."""
         truth = []
-        names = self._named_as_clicked()
         for number, one in enumerate(self.by_role["target"], 1):
             part = "gnss" if one.item.part("gnss") is not None else "poses"
             block = self._over_time(one, part, f"target-{number}")
-            block |= {"target": names.get(one.target, one.target), "position": position()}
+            block |= {"target": one.target, "position": position()}
             truth.append(block | stated_spreads(stream_of(one, part)))
         for number, one in enumerate(self.by_role["marks"], 1):
             stream = stream_of(one, "marks")
@@ -377,21 +376,6 @@ class Proposal:
             truth.append(block | {"position": position()} | stated_spreads(stream))
         if truth:
             self.data["truth"] = truth
-
-    def _named_as_clicked(self) -> dict[str, str]:
-        """Names of targets: where one track and one clicked name are left over, they are the same thing."""
-        tracks = [one.target for one in self.by_role["target"]]
-        marked, clicked = (
-            {str(name) for one in self.by_role[part] for name in stream_of(one, part).columns.get("name", ())}
-            for part in ("marks", "clicks")
-        )
-        left, names = [one for one in tracks if one not in clicked], clicked - {""} - marked - set(tracks)
-        if len(left) != 1 or len(names) != 1:
-            return {}
-        name = names.pop()
-        said = f"The track {left[0]} is taken for what was clicked as {printable(name)}."
-        self.notes.append(said)
-        return {left[0]: name}
 
     def _add_clicks(self, images: Choice | None) -> None:
         """What was clicked in the images."""
