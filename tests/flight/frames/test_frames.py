@@ -13,16 +13,16 @@ import pytest
 from tests.annotation import write_images
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.frames import open_frames, read_image
-from wildlab.flight.readers.frames.image import images_below
-from wildlab.flight.readers.frames.scene import find_clipped, find_no_data, find_overlay
-from wildlab.flight.readers.frames.thermal import (
+from wildlab.flight.readers.frames.image import (
     Planck,
     gather_pieces,
+    images_below,
     open_image,
     read_records,
     segments_of,
     to_kelvin,
 )
+from wildlab.flight.readers.frames.scene import find_clipped, find_no_data, find_overlay
 from wildlab.replay.images import read_shots
 
 

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from wildlab.flight.readers.frames import Frame, open_frames
+from wildlab.flight.readers.frames import Frame, mark_shutter, open_frames
 from wildlab.flight.readers.frames.scene import (
     MOST_DEAD,
     find_dead,
@@ -14,7 +14,6 @@ from wildlab.flight.readers.frames.scene import (
     measure_vignetting,
     without_vignetting,
 )
-from wildlab.flight.readers.frames.sequence import mark_shutter
 from wildlab.simulation.scene.response import CameraResponse, Sensor, expose, sensor_of
 
 SHAPE = (128, 160)

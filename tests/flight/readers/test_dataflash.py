@@ -17,7 +17,7 @@ from tests.flight.readers.dataflash_logs import (
 )
 from tests.flight.readers.tracks import Reader
 from wildlab.errors import WildlabError
-from wildlab.flight.readers.dataflash import read_records
+from wildlab.flight.readers.ardupilot import read_records
 
 dataflash, dataflash_text = Reader("dataflash"), Reader("dataflash-text")
 

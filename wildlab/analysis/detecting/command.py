@@ -57,8 +57,7 @@ from wildlab.evaluation.intervals import Interval
 from wildlab.files import write_atomic, write_csv, write_json
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.files import printable, read_regular
-from wildlab.flight.readers.frames import Frame, Frames, Polarity, open_frames
-from wildlab.flight.readers.frames.sequence import CORRECTIONS
+from wildlab.flight.readers.frames import CORRECTIONS, Frame, Frames, Polarity, open_frames
 from wildlab.flight.readers.labels import Labels, read_labels
 from wildlab.flight.store import load_flight
 from wildlab.geometry.frames import Array

@@ -17,13 +17,12 @@ the record pauses, so that each stretch between pauses has a fit of its own.
 
 from __future__ import annotations
 
-import csv
 import re
 from itertools import pairwise
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from wildlab.errors import WildlabError
 from wildlab.flight.clock_fitting import ClockFit, fit_clock
@@ -40,7 +39,16 @@ from wildlab.flight.readers.log import (
     holding,
     named,
 )
-from wildlab.flight.readers.text import calendar_s, decode, number, numbers, plural, stamp_s
+from wildlab.flight.readers.text import (
+    calendar_s,
+    decode,
+    header_of,
+    number,
+    numbers,
+    plural,
+    read_text_table,
+    stamp_s,
+)
 from wildlab.flight.units import WEEK_S, wall_to_utc, week_to_utc
 
 #: What is said of a clock without a zone.
@@ -60,24 +68,10 @@ _PAIR = re.compile(r"\b([A-Za-z_]{1,30}) {0,2}: {0,2}(-?\d{1,12}(?:\.\d{1,15})?)
 _HEIGHT = re.compile(r"[ ,]H (-?\d{1,6}(?:\.\d{1,6})?)m", re.ASCII)
 _NUMBER = re.compile(r"-?\d{1,12}(?:\.\d{1,15})?", re.ASCII)
 _TRACE = re.compile(r"GPS {0,2}\(|\[\s*l(?:atitude|ong)|BAROMETER|SrtCnt|FrameCnt")
-_PLACE = ("latitude_deg", "longitude_deg", "height_home_m", "height_sea_m", "satellites")
+_PLACE = ("latitude_deg", "longitude_deg", "height_home_m", "height_sea_m")
 #: Both are said as pitch, roll, yaw.
 _AIRCRAFT = ("pitch_deg", "roll_deg", "yaw_deg")
 _GIMBAL = ("pitch_world_deg", "roll_world_deg", "yaw_world_deg")
-
-
-class _Block(NamedTuple):
-    """What one subtitle says: seconds, `_PLACE`, `_AIRCRAFT` and `_GIMBAL`.
-
-    `vague`: the height stood as `altitude`.
-    """
-
-    code: float
-    wall: float
-    place: list[float]
-    aircraft: list[float]
-    gimbal: list[float]
-    vague: bool
 
 
 def srt_sniff(head: bytes) -> bool:
@@ -99,44 +93,37 @@ def srt_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     """
     text = decode(data)
     found = list(_CODES.finditer(text))
-    ends = [one.start() for one in found[1:]] + [len(text)]
+    ends = [*(one.start() for one in found[1:]), len(text)][: len(found)]
     # No family writes more; what follows is no subtitle.
     read = [
         _block(code, text[code.end() : min(end, code.end() + 4000)])
         for code, end in zip(found, ends, strict=True)
     ]
-    rows = [at for at, one in enumerate(read, 1) if one is not None]
-    blocks = [one for one in read if one is not None]
-    if not any(np.isfinite(block.place[0]) for block in blocks):
+    rows = [at for at, one in enumerate(read, 1) if one]
+    table = pd.DataFrame([one for one in read if one])
+    if not len(table) or not table["latitude_deg"].notna().any():
         problem = f"{plural(len(found), 'subtitle')}, and none with a place"
         fix = "switch video captions on in DJI's app before the flight, and take the aircraft's own file"
         raise WildlabError(problem, fix, file=path)
-    place = np.array([block.place for block in blocks])
-    times, clock, reasons = _times(blocks, zone)
+    columns = {str(name): one.to_numpy(float) for name, one in table.items()}
+    times, clock, reasons = _times(columns["code"], columns["wall"], zone)
     notes = {
         "no clock in it: stamps are those of the subtitles, from the beginning of the video": clock is None,
         "its clock is local time without a zone: state the zone": NO_ZONE in reasons,
-        "altitude is taken as height above take-off, which the file does not say": any(
-            block.vague for block in blocks
-        ),
+        "altitude is taken as height above take-off, which the file does not say": columns["vague"].any(),
     }
-    columns = times | named(_PLACE, place.T)
-    parts = {"gnss": Readings(columns, rows, "subtitle", reasons)}
-    placed = {name: values for name, values in columns.items() if name != "satellites"}
-    for part, names, before in (("poses", _AIRCRAFT, placed), ("gimbal", _GIMBAL, times)):
-        angles = np.array([block.aircraft if part == "poses" else block.gimbal for block in blocks])
-        if np.isfinite(angles).any():
-            parts[part] = Readings(before | named(names, angles.T), rows, "subtitle", reasons)
-    bad = len(found) - len(blocks)
-    return Decoded(
-        parts,
-        clock=clock,
-        lost=[(bad, "subtitle", f"of {len(found)} without a place")],
-        notes=holding(notes),
-    )
+    parts = {"gnss": (*_PLACE, "satellites"), "poses": (*_PLACE, *_AIRCRAFT), "gimbal": _GIMBAL}
+    made = {
+        part: Readings(times | {name: columns[name] for name in names}, rows, "subtitle", reasons)
+        for part, names in parts.items()
+        if np.isfinite(columns[names[-1]]).any() or part == "gnss"
+    }
+    lost = [(len(found) - len(rows), "subtitle", f"of {len(found)} without a place")]
+    return Decoded(made, clock=clock, lost=lost, notes=holding(notes))
 
 
-def _block(code: re.Match[str], body: str) -> _Block | None:
+def _block(code: re.Match[str], body: str) -> dict[str, float]:
+    """What one subtitle says, empty where it says no place; `vague`: the height stood as `altitude`."""
     groups = {name: said.split(",") for name, said in _GROUP.findall(body)}
     pairs = {name.lower(): number(value) for name, value in _PAIR.findall(body)}
 
@@ -146,11 +133,10 @@ def _block(code: re.Match[str], body: str) -> _Block | None:
     # So the word stands in files of some aircraft.
     latitude, longitude = of("latitude"), of("longitude", "longtitude")
     home, sea, satellites = of("rel_alt"), of("abs_alt"), np.nan
-    vague = False
-    if "latitude" in pairs:
-        vague = "altitude" in pairs and np.isnan(home) and np.isnan(sea)
-        home = of("altitude") if vague else home
-    elif len(said := groups.get("GPS", [])) >= 2:
+    vague = "latitude" in pairs and "altitude" in pairs and np.isnan(home) and np.isnan(sea)
+    if vague:
+        home = of("altitude")
+    elif "latitude" not in pairs and len(said := groups.get("GPS", [])) >= 2:
         longitude, latitude = _first(said[0]), _first(said[1])
         # The family that says its height here has the latitude first.
         if len(said) > 2 and said[2].strip().upper().endswith("M"):
@@ -159,20 +145,21 @@ def _block(code: re.Match[str], body: str) -> _Block | None:
             satellites = _first(said[2])
         height = _HEIGHT.search(body)
         home = number(height[1]) if height else of("barometer")
-    if "GPS" not in groups and (np.isnan(latitude) or np.isnan(longitude)):
-        return None
+    if "GPS" not in groups and np.isnan(latitude + longitude):
+        return {}
     gimbal = _three(groups.get("G.PRY"))
     if np.isnan(gimbal).all():
         gimbal = [of(f"gb_{name}") for name in ("pitch", "roll", "yaw")]
     hours, minutes, seconds, part = code.groups()[:4]
-    return _Block(
-        int(hours) * 3600.0 + int(minutes) * 60.0 + int(seconds) + int(part) / 10.0 ** len(part),
-        _wall(_WALL.search(body)),
-        [latitude, longitude, home, sea, satellites],
-        _three(groups.get("F.PRY")),
-        gimbal,
-        vague,
-    )
+    return {
+        "code": int(hours) * 3600.0 + int(minutes) * 60.0 + int(seconds) + int(part) / 10.0 ** len(part),
+        "wall": _wall(_WALL.search(body)),
+        **named(_PLACE, (latitude, longitude, home, sea)),
+        "satellites": satellites,
+        **named(_AIRCRAFT, _three(groups.get("F.PRY"))),
+        **named(_GIMBAL, gimbal),
+        "vague": float(vague),
+    }
 
 
 def _first(text: str) -> float:
@@ -192,12 +179,13 @@ def _wall(found: re.Match[str] | None) -> float:
     return calendar_s(*found.groups()[:6]) + int(digits) * 1e-6
 
 
-def _times(blocks: list[_Block], zone: str | None) -> tuple[dict[str, Array], Clock | None, dict[str, Mask]]:
-    wall = np.array([block.wall for block in blocks])
+def _times(
+    code: Array, wall: Array, zone: str | None
+) -> tuple[dict[str, Array], Clock | None, dict[str, Mask]]:
     none = np.full(len(wall), np.nan)
     clocked = np.isfinite(wall)
     if not clocked.any():
-        return {"time_s": none, "time_log_s": np.array([block.code for block in blocks])}, None, {}
+        return {"time_s": none, "time_log_s": code}, None, {}
     if zone is None:
         times = {"time_s": none, "time_log_s": wall}
         return times, Clock(NO_ZONE, pairs=int(clocked.sum())), {NO_ZONE: clocked, "no time": ~clocked}
@@ -312,9 +300,8 @@ _PAUSE_S, _FEW = 1.5, 10
 
 
 def airdata_sniff(head: bytes) -> bool:
-    """Whether the first line has AirData's columns of time, UTC and place."""
-    names = {one for one, _ in _header(decode(head).split("\n", 1)[0])}
-    return {"time", "latitude", "longitude"} <= names and any(one.startswith("datetime") for one in names)
+    """Whether the first line has AirData's columns of UTC and place."""
+    return {"datetime_utc", "latitude", "longitude"} <= set(header_of(head))
 
 
 def airdata_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
@@ -325,20 +312,14 @@ def airdata_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     WildlabError
         Where columns are missing, a unit is unknown, or no row can be read.
     """
-    # Each line by itself: a quotation mark that is never closed costs one.
-    lines = decode(data).split("\n")
-    header = _header(lines[0])
+    table = read_text_table(data, path)
+    header = [_name_and_unit(one) for one in table.header]
     names = [name for name, _ in header]
-    wanted = {"latitude": "latitude", "longitude": "longitude", "datetimeutc": "datetime(utc)"}
-    missing = [shown for name, shown in wanted.items() if name not in names]
+    missing = [one for one in ("latitude", "longitude", "datetimeutc") if one not in names]
     if missing:
-        problem = f"has no column {' and '.join(repr(one) for one in missing)}"
+        problem = f"has no column {missing[0]!r}"
         raise WildlabError(problem, "export the flight from AirData again", file=path, field="header")
-    found = [(at, _cells(line)) for at, line in enumerate(lines[1:], 2) if line.strip("\r\x00 ")]
-    kept = [(at, row) for at, row in found if len(row) >= 0.5 * len(header)]
-    if not kept:
-        raise WildlabError("has no row under its header", "export the flight from AirData again", file=path)
-    cells = [row + [""] * (len(header) - len(row)) for _, row in kept]
+    cells = table.rows
     columns: dict[str, Array] = {}
     for ours, theirs in _COLUMNS.items():
         place = next((names.index(name) for name in theirs if name in names), None)
@@ -352,9 +333,9 @@ def airdata_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     time, clock = _fraction(own, whole, notes)
     times = {"time_s": time, "time_log_s": own if np.isfinite(own).any() else whole}
     return Decoded(
-        _parts(times, columns, np.array([at for at, _ in kept]), notes),
+        _parts(times, columns, np.array(table.lines), notes),
         clock=clock,
-        lost=[(len(found) - len(kept), "line", f"of {len(found)} cut off")],
+        lost=table.lost(),
         notes=notes,
     )
 
@@ -399,15 +380,12 @@ def _heading_that_stands(gimbal: Array, aircraft: Array) -> list[str]:
     ]
 
 
-def _header(line: str) -> list[tuple[str, str]]:
-    """Names without anything but letters, and units, of the columns."""
-    found = []
-    for cell in _cells(line) if line else []:
-        name, _, unit = cell.partition("(")
-        name, unit = re.sub(r"[^a-z]", "", name.lower()), unit.strip(") ").lower()
-        # "datetime(utc)" and "datetime(local)" are two columns.
-        found.append((name + unit if name == "datetime" else name, unit))
-    return found
+def _name_and_unit(cell: str) -> tuple[str, str]:
+    """A column's name without anything but letters, and its unit."""
+    name, _, unit = cell.partition("(")
+    name, unit = re.sub(r"[^a-z]", "", name.lower()), unit.strip(") ").lower()
+    # "datetime(utc)" and "datetime(local)" are two columns.
+    return (name + unit if name == "datetime" else name), unit
 
 
 def _unit(path: Path, ours: str, column: tuple[str, str]) -> float:
@@ -418,14 +396,6 @@ def _unit(path: Path, ours: str, column: tuple[str, str]) -> float:
         problem = f"has the unit {unit[:20]!r}, which is not known"
         raise WildlabError(problem, "export the flight in metric units", file=path, field=name)
     return _UNITS[unit]
-
-
-def _cells(line: str) -> list[str]:
-    line = line.strip("\r\x00 ")
-    try:
-        return next(csv.reader([line]))
-    except (csv.Error, StopIteration):
-        return line.split(",")
 
 
 def _fraction(own: Array, whole: Array, notes: list[str]) -> tuple[Array, Clock | None]:

@@ -56,7 +56,7 @@ FORMATS: dict[str, Format] = {
     "marks-kml": Format("vector", "KML placemarks", start="kml_"),
     "marks-geojson": Format("vector", "GeoJSON points", start="geojson_"),
     "marks-csv": Format("vector", "table of surveyed points", start="table_"),
-    "clicks": Format("labels", "clicks or boxes in images", start="clicks_"),
+    "clicks": Format("clicks", "clicks or boxes in images", start="clicks_"),
 }
 
 
@@ -98,7 +98,7 @@ def read_log(path: Path, data: bytes, format_: str, zone: str | None = None) -> 
 #: Formats of whole folders, by their names in recipes.
 FOLDERS: dict[str, Format] = {
     "photos": Format("photos", "folder of images", start="folder_"),
-    "clicks-yolo": Format("labels", "folder of YOLO's labels", start="folder_"),
+    "clicks-yolo": Format("clicks", "folder of YOLO's labels", start="folder_"),
 }
 #: So much of the beginning of each file goes into a folder's checksum: images are large and many.
 HASHED = 65536

@@ -9,12 +9,10 @@ which is that of the images that lie beside; without one such rows say so and ar
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import islice
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any
 
@@ -25,20 +23,14 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field, RootModel
 
 from wildlab.errors import WildlabError
-from wildlab.flight.files import check_model, leaves_folder, printable, read_regular, unreadable
-from wildlab.flight.readers.frames.image import SUFFIXES
-from wildlab.flight.readers.log import Decoded, Mask, Readings, holding, named
-from wildlab.flight.readers.photos import read_tags, size_of
+from wildlab.flight.files import check_model, printable, read_regular, unreadable
+from wildlab.flight.readers.log import Mask
 from wildlab.flight.readers.text import (
     Identity,
     Real,
-    header_of,
-    number,
     numbers,
     parse_json,
-    parse_xml,
     plain,
-    plural,
     read_text_table,
 )
 
@@ -98,11 +90,15 @@ class Marked:
     counted_in: str = "box"
 
 
-def _boxes(rows: Sequence[tuple[Any, ...]]) -> pd.DataFrame:
+def box_table(rows: Sequence[tuple[Any, ...]]) -> pd.DataFrame:
     """`Marked.table` of (name, box, kind, score, crowd), each counted as it stands here."""
     table = pd.DataFrame(rows, columns=["name", "box", "kind", "score", "crowd"])
     table[SIDES] = np.array(table.pop("box").tolist(), float).reshape(-1, 4)
     return table.assign(score=table["score"].astype(float), row=np.arange(1, len(table) + 1))
+
+
+def plain_path(name: str) -> PurePosixPath:
+    return PurePosixPath(name.replace("\\", "/"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +136,7 @@ class Labels:
         """Names without their folders, and without folders and endings."""
         found: dict[str, list[str]] = {}
         for name in self.boxes:
-            place = _plain(name)
+            place = plain_path(name)
             for key in {place.name, place.stem}:
                 found.setdefault(key, []).append(name)
         return found
@@ -409,8 +405,7 @@ def read_json_boxes(
     seen = found.get("images") if keys else None
     batch = isinstance(seen, list) and any(isinstance(one, dict) and "detections" in one for one in seen)
     if group is not None:
-        problem = "says nothing of groups"
-        raise WildlabError(problem, "leave --group out, or give COCO's truth", file=path, field=group)
+        raise WildlabError("says nothing of groups", "leave --group out", file=path, field=group)
     if isinstance(found, list):
         return _results(check_model(Results, found, path).root, path, truth)
     if batch or {"images", "detection_categories"} <= keys:
@@ -444,7 +439,7 @@ def _truth(found: Truth, path: Path, group: str | None) -> Marked:
             unjudged.append(name)
     return Marked(
         "COCO",
-        _boxes(rows),
+        box_table(rows),
         tuple(one for one in groups if one not in set(unjudged)),
         tuple(dict.fromkeys(categories.values())),
         sizes={
@@ -479,7 +474,7 @@ def _results(found: list[Result], path: Path, truth: Marked | None) -> Marked:
         problem = f"none of {len(found)} results is of an image of the labels"
         fix = "give the COCO file of the same images with --labels"
         raise WildlabError(problem, fix, file=path, field="image_id")
-    table = _boxes(rows)
+    table = box_table(rows)
     return Marked(
         "COCO results",
         table,
@@ -509,7 +504,7 @@ def _megadetector(found: Batch, path: Path) -> Marked:
     ]
     return Marked(
         "MegaDetector",
-        _boxes(rows),
+        box_table(rows),
         tuple(one.file for _, one in read),
         tuple(kinds.values()),
         relative=True,
@@ -563,17 +558,17 @@ IGNORED = frozenset({"dontcare", "ignore", "crowd"})
 NO_VALUE = frozenset({"", "nan", "na", "n/a", "null", "none"})
 
 
-def _bare(names: Iterable[str]) -> list[str]:
+def bare_names(names: Iterable[str]) -> list[str]:
     """Names of columns as people vary them, without ``_``: ``X_min`` is ``xmin``."""
     return [plain(one).replace("_", "") for one in names]
 
 
-def _way_of(names: list[str], clicks: bool) -> tuple[str, ...] | None:
+def way_of(names: list[str], clicks: bool) -> tuple[str, ...] | None:
     """How a table with these bare names says where things are, see `WAYS`; None where it does not.
 
     Of clicks a point goes before a box, of which it may be the centroid, and ``x, y`` is one.
     """
-    found = [way for way in WAYS if set(_bare(way)) <= set(names) and (clicks or way != ("x", "y"))]
+    found = [way for way in WAYS if set(bare_names(way)) <= set(names) and (clicks or way != ("x", "y"))]
     return next(iter(found if clicks else sorted(found, key=lambda one: WAYS[one] == "point")), None)
 
 
@@ -603,11 +598,11 @@ def read_table(data: bytes, path: Path, *, group: str | None = None, clicks: boo
         Where the table cannot be read, lacks a column, has no row, or has one that cannot be used.
     """
     table = read_text_table(data, path)
-    bare, header = _bare(table.header), table.header
+    bare, header = bare_names(table.header), table.header
     shown = ", ".join(map(printable, header[:12]))
 
     def find(wanted: Iterable[str]) -> int | None:
-        return next((bare.index(one) for one in _bare(wanted) if one in bare), None)
+        return next((bare.index(one) for one in bare_names(wanted) if one in bare), None)
 
     def texts(column: int | None) -> list[str]:
         return ["" if column is None else row[column].strip() for row in table.rows]
@@ -624,7 +619,7 @@ def read_table(data: bytes, path: Path, *, group: str | None = None, clicks: boo
     if table.short and not clicks:
         line, values = table.short[0]
         raise fail(f"line {line} has {values} values, and there are {len(header)} columns", "mend it")
-    image, way = find(IMAGE_COLUMNS), _way_of(bare, clicks)
+    image, way = find(IMAGE_COLUMNS), way_of(bare, clicks)
     numbered = find([NUMBER_COLUMN]) if image is None and not clicks else None
     name = image if numbered is None else numbered
     if name is None:
@@ -639,7 +634,7 @@ def read_table(data: bytes, path: Path, *, group: str | None = None, clicks: boo
         counted = table.numbers(name)
         refuse(np.isnan(counted), "number frames from 0", [name])
         names = [str(int(one)) for one in counted]
-    columns = [bare.index(one) for one in _bare(way)]
+    columns = [bare.index(one) for one in bare_names(way)]
     given = np.stack([table.numbers(one) for one in columns], axis=1)
     middle = [find([one]) for one in ("u_px", "v_px")]
     if WAYS[way] == "corners":
@@ -740,7 +735,7 @@ def read_yolo_folder(path: Path) -> Marked:
         for at, line in enumerate(data.decode("utf-8", errors="replace").splitlines(), start=1):
             if words := line.split():
                 rows.append((file.stem, *_line(words, names, file, f"line {at}"), False))
-    table = _boxes(rows)
+    table = box_table(rows)
     known = tuple(names.values()) or tuple(dict.fromkeys(table["kind"]))
     return Marked("YOLO", table, tuple(one.stem for one in files), known, relative=True)
 
@@ -803,168 +798,3 @@ def _yaml_names(text: str, path: Path) -> dict[int, str]:
         fix = f"write them into a {NAMES}, one a line"
         raise WildlabError("a list of names is wanted", fix, file=path, field="names")
     return {at: printable(str(one)) for at, one in named.items()}
-
-
-# -- clicks
-
-#: Attributes of CVAT that name a thing more closely than its label.
-ATTRIBUTES = frozenset({"name", "target", "target_id", "id", "marker"})
-#: Letters of a name at most.
-MOST_LETTERS = 200
-
-
-def clicks_sniff(head: bytes) -> bool:
-    """Whether a file is one of the known kinds, by its content."""
-    start = head.lstrip(b"\xef\xbb\xbf \r\n\t")
-    if start[:1] in (b"{", b"["):
-        words = (b'"annotations"', b'"detection_categories"', b'"detections"', b'"bbox"', b'"file_name"')
-        return any(one in head for one in words)
-    if start[:1] == b"<":
-        return b"<annotations" in head and re.search(b"<(image|meta|version)", head) is not None
-    names = _bare(header_of(head))
-    return bool(set(_bare(IMAGE_COLUMNS)) & set(names)) and _way_of(names, clicks=True) is not None
-
-
-def clicks_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
-    """Clicks and boxes of one file; images whose sizes are wanted lie beside it.
-
-    Raises
-    ------
-    WildlabError
-        Where it is of no format that is known, or something in it is wrong.
-    """
-    start = data.lstrip(b"\xef\xbb\xbf \r\n\t")[:1]
-    if start in (b"{", b"["):
-        return _decoded(read_json_boxes(data, path), path, path.parent)
-    return _decoded(_cvat(data, path) if start == b"<" else read_table(data, path, clicks=True), path, path)
-
-
-def folder_decode(folder: Path, zone: str | None) -> Decoded:
-    """Boxes of a folder of YOLO's text files, one for each image; ``image`` is its name without the ending.
-
-    Raises
-    ------
-    WildlabError
-        Where there is no such file, or a line is wrong.
-    """
-    return _decoded(read_yolo_folder(folder), folder, folder)
-
-
-def _decoded(marked: Marked, path: Path, folder: Path) -> Decoded:
-    crowd = marked.table["crowd"].astype(bool)
-    table = marked.table[~crowd]
-    if not len(table):
-        raise WildlabError("marks nothing", "give a file with boxes or points", file=path)
-    names, boxes = table["name"].tolist(), table[SIDES].to_numpy(float)
-    without = 0
-    if marked.relative:
-        sizes = sizes_beside(folder, names)
-        known = np.array([sizes.get(one, (np.nan, np.nan)) for one in names], float)
-        boxes = boxes * np.tile(known, 2)
-        without = int(np.isnan(known).any(axis=1).sum())
-    notes = {
-        f"{marked.format}: {plural(len(table), 'box')}": marked.counted_in == "box",
-        f"{without} of {len(table)} boxes are shares of images whose size is not known": without,
-        "images are told by their ids, and which file has which id is not said": marked.by == "id",
-    }
-    # One without extent is a point.
-    box = np.where((boxes[:, 2:] > 0).any(axis=1, keepdims=True), boxes, np.nan)
-    columns: dict[str, Any] = {
-        "image": [one[:MOST_LETTERS] for one in names],
-        "name": [printable(one[:MOST_LETTERS]) for one in table["kind"]],
-        "u_px": boxes[:, 0] + boxes[:, 2] / 2,
-        "v_px": boxes[:, 1] + boxes[:, 3] / 2,
-        "score": table["score"].to_numpy(float),
-        **named(("box_u_px", "box_v_px", "box_width_px", "box_height_px"), box.T),
-    }
-    unusable = {
-        "no place in the image": ~np.isfinite(columns["u_px"] + columns["v_px"]),
-        "no image": np.array([not one for one in names], bool),
-    }
-    lost = [(count, "thing", f"left out: {what}") for what, count in marked.left_out.items()]
-    lost.append((int(crowd.sum()), "region", "of many that are not told apart"))
-    part = Readings(columns, table["row"], marked.counted_in, unusable)
-    return Decoded({"clicks": part}, lost=lost, notes=holding(notes))
-
-
-def _plain(name: str) -> PurePosixPath:
-    return PurePosixPath(name.replace("\\", "/"))
-
-
-def sizes_beside(folder: Path, names: Iterable[str]) -> dict[str, tuple[float, float]]:
-    """Width and height of images, px, out of their headers.
-
-    Parameters
-    ----------
-    folder
-        Of the labels. Images are looked for in it, in ``images`` in it and beside it, and where a folder
-        ``labels`` above it has one ``images`` beside it, as programs that train detectors have them.
-    names
-        Of images, with or without their ending, perhaps with folders; none of them leads elsewhere.
-
-    Returns
-    -------
-    dict
-        By those names that an image was found for.
-    """
-    parts = folder.parts
-    above = [
-        Path(*parts[:at], "images", *parts[at + 1 :])
-        for at in range(len(parts) - 1, max(len(parts) - 4, 0), -1)
-        if parts[at] == "labels"
-    ]
-    every = dict.fromkeys([folder, folder / "images", folder.parent / "images", *above])
-    places = [one for one in every if one.is_dir()]
-    listed: dict[str, Path] = {}
-    for place in reversed(places):
-        try:
-            for one in islice(place.iterdir(), MOST_FILES):
-                if one.suffix.lower() in SUFFIXES:
-                    listed |= {one.stem: one, one.name: one}
-        except OSError:
-            continue
-    found = {}
-    for name in dict.fromkeys(names):
-        plain = _plain(name)
-        deep = len(plain.parts) > 1 and not leaves_folder(name)
-        own = next((place / plain for place in places if deep and _is_image(place / plain)), None)
-        path = own or listed.get(plain.name) or listed.get(plain.stem)
-        size = (0, 0) if path is None else size_of(read_tags(path))
-        if all(size):
-            found[name] = (float(size[0]), float(size[1]))
-    return found
-
-
-def _is_image(path: Path) -> bool:
-    try:
-        return path.suffix.lower() in SUFFIXES and path.is_file()
-    except (OSError, ValueError):
-        return False
-
-
-def _cvat(data: bytes, path: Path) -> Marked:
-    """Boxes and points of CVAT's format for images, 1.1."""
-    left_out: Counter[str] = Counter()
-    rows: list[tuple[Any, ...]] = []
-    for image in parse_xml(data, path).iter("image"):
-        for shape in image:
-            named = [
-                (one.text or "").strip()
-                for one in shape.iter("attribute")
-                if one.get("name", "").strip().lower() in ATTRIBUTES
-            ]
-            name = next((one for one in reversed(named) if one), shape.get("label", ""))
-            places: list[tuple[float, ...]] = []
-            if shape.tag == "box":
-                left, top, right, bottom = (number(shape.get(one)) for one in ("xtl", "ytl", "xbr", "ybr"))
-                places = [(left, top, right - left, bottom - top)]
-            elif shape.tag == "points":
-                pairs = (one.partition(",") for one in shape.get("points", "").split(";"))
-                places = [(number(u), number(v), 0.0, 0.0) for u, _, v in pairs]
-            elif shape.tag != "tag":
-                left_out[f"shape {printable(shape.tag[:40])}"] += 1
-            rows += [(image.get("name", ""), one, name, np.nan, False) for one in places]
-    if not rows:
-        fix = "export the task as CVAT for images 1.1"
-        raise WildlabError("has no box or point of CVAT", fix, file=path, field="image")
-    return Marked("CVAT", _boxes(rows), (), (), left_out=left_out, counted_in="shape")

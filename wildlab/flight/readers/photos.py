@@ -28,13 +28,16 @@ from scipy.spatial.transform import Rotation
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import regular_size, unreadable
-from wildlab.flight.readers.frames.image import MOST_BYTES, SUFFIXES, file_name, no_images
-from wildlab.flight.readers.frames.thermal import (
+from wildlab.flight.readers.frames.image import (
     CAMERA,
+    MOST_BYTES,
     RAW,
     RECORDS,
+    SUFFIXES,
+    file_name,
     find_records,
     gather_pieces,
+    no_images,
     open_image,
     record_order,
     segments_of,
@@ -91,17 +94,7 @@ def size_of(tags: Tags) -> tuple[int, int]:
 
 
 def read_tags(path: Path) -> Tags:
-    """Tags of one image file; whatever cannot be read is left out and said in `Tags.problem`.
-
-    Parameters
-    ----------
-    path
-        Of a JPEG, PNG, TIFF or ``.fff`` file.
-
-    Returns
-    -------
-    Tags
-    """
+    """Tags of a JPEG, PNG, TIFF or ``.fff``; what cannot be read is left out and said in `Tags.problem`."""
     found = Tags()
     try:
         size = regular_size(path, MOST_BYTES)
@@ -630,28 +623,10 @@ def _files(folder: Path) -> tuple[list[Path], list[tuple[int, str, str]]]:
 
 
 def _times(tags: list[Tags], zone: str | None) -> tuple[Array, Array, Clock | None, list[str]]:
-    """Stamps of images.
+    """The camera's clock as if it were UTC, and UTC, (N,) s since 1970; how the one became the other; notes.
 
     The camera's clock has the intervals, and satellites or a zone bring it to UTC: a stamp of GPS may be of
     the second before, or of the last fix.
-
-    Parameters
-    ----------
-    tags
-        Of N images.
-    zone
-        Of the camera's clock where they do not state it.
-
-    Returns
-    -------
-    wall, time, clock, notes
-        (N,) s since 1970 by the camera's clock as if it were UTC, and in UTC, NaN where not known; how the
-        one became the other, None where there are none; sentences.
-
-    Raises
-    ------
-    WildlabError
-        Where the zone is none.
     """
     wall, ahead = np.array([wall_of(one) for one in tags], float).reshape(-1, 2).T
     sky = np.array([satellite_time_of(one) for one in tags], float)
@@ -759,18 +734,9 @@ def of_camera(log: RawLog, camera: str) -> RawLog:
 
 
 def camera_of(log: RawLog) -> dict[str, Any] | None:
-    """Size and focal length of the one camera of a folder, as its tags have them.
+    """Name, size and focal length (px, and ``how``: what it is from) of the one camera of a folder.
 
-    Parameters
-    ----------
-    log
-        Of a folder of images.
-
-    Returns
-    -------
-    dict or None
-        ``camera`` (its name), ``width_px``, ``height_px``, ``focal_px``, ``how`` (a clause on where the focal
-        length is from); None where no tag says a focal length in px, or a size.
+    None where no tag says a focal length in px, or a size.
 
     Raises
     ------

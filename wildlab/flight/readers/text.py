@@ -108,18 +108,6 @@ def plural(count: int, singular: str) -> str:
     return f"{count:,} {word if count == 1 else several}{of}{rest}"
 
 
-def percent(count: int, total: int) -> str:
-    """A share in percent, as it stands in sentences.
-
-    Examples
-    --------
-    >>> percent(1, 30000), percent(299, 300)
-    ('0.0033 %', '99.7 %')
-    """
-    value = 100 * count / max(total, 1)
-    return f"{value:.2g} %" if value < 1 else f"{value:.1f} %"
-
-
 class TextTable(NamedTuple):
     """A table, read.
 
