@@ -486,10 +486,10 @@ def _decoded(
 ) -> Decoded:
     """A log of messages; `title` is what the file says of the vehicle outside of them."""
     if not set(tables) - {"FMT"}:
-        problem = "holds no message of an ArduPilot log that can be read"
+        problem = "holds no message of ArduPilot"
         raise WildlabError(problem, "copy it from the card again", file=path)
     if any(name in tables and tables[name].has(one) for name, one in (("ATT", "qw"), ("TIME", "StartTime"))):
-        problem = "is a log of PX4's old format sdlog2, whose messages have other units under the same names"
+        problem = "is a log of PX4's old format sdlog2"
         raise WildlabError(problem, "log with a newer PX4, as .ulg", file=path)
     tables, left_out = longest_run(tables)
     log, receivers = _clocked(tables, counted_in)
@@ -505,7 +505,7 @@ def _decoded(
     }
     parts = {name: part for name, part in found.items() if part is not None and len(part.columns["time_s"])}
     if not parts:
-        problem = "has no message of attitude, position, sensors or images"
+        problem = "holds no attitude, position, sensors or images"
         raise WildlabError(problem, "log these messages (LOG_BITMASK of the autopilot)", file=path)
     said = [text for name, field in (("VER", "FWS"), ("MSG", "Message")) if name in tables
             for text in tables[name].texts(field)]  # fmt: skip
@@ -791,7 +791,7 @@ def _notes(
         "no satellite fix tells UTC": clock is not None and not clock.base,
         f"positions of poses are those of messages {place and place.name}": "poses" in parts and place,
         f"of {len(receivers)} satellite receivers number {receiver} is used": len(receivers) > 1,
-        "heights of its messages CAM do not say what they count from, and are left out": (
+        "heights of CAM are left out: nothing says what they count from": (
             "triggers" in parts and "height_sea_m" not in parts["triggers"].columns
         ),
     }

@@ -92,8 +92,8 @@ def _decoded(marked: Marked, path: Path, folder: Path) -> Decoded:
         without = int(np.isnan(known).any(axis=1).sum())
     notes = {
         f"{marked.format}: {plural(len(table), 'box')}": marked.counted_in == "box",
-        f"{without} of {len(table)} boxes are shares of images whose size is not known": without,
-        "images are told by their ids, and which file has which id is not said": marked.by == "id",
+        f"{without} of {len(table)} boxes are of images of unknown size": without,
+        "images are known by ids alone": marked.by == "id",
     }
     # One without extent is a point.
     box = np.where((boxes[:, 2:] > 0).any(axis=1, keepdims=True), boxes, np.nan)

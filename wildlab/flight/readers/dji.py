@@ -103,14 +103,14 @@ def srt_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     table = pd.DataFrame([one for one in read if one])
     if not len(table) or not table["latitude_deg"].notna().any():
         problem = f"{plural(len(found), 'subtitle')}, and none with a place"
-        fix = "switch video captions on in DJI's app before the flight, and take the aircraft's own file"
+        fix = "switch video captions on in DJI's app"
         raise WildlabError(problem, fix, file=path)
     columns = {str(name): one.to_numpy(float) for name, one in table.items()}
     times, clock, reasons = _times(columns["code"], columns["wall"], zone)
     notes = {
-        "no clock in it: stamps are those of the subtitles, from the beginning of the video": clock is None,
+        "it has no clock: stamps count from the beginning of the video": clock is None,
         "its clock is local time without a zone: state the zone": NO_ZONE in reasons,
-        "altitude is taken as height above take-off, which the file does not say": columns["vague"].any(),
+        "altitude is taken as height above take-off": columns["vague"].any(),
     }
     parts = {"gnss": (*_PLACE, "satellites"), "poses": (*_PLACE, *_AIRCRAFT), "gimbal": _GIMBAL}
     made = {
@@ -247,7 +247,7 @@ def mrk_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
         {"triggers": Readings(columns, [at for at, _ in found], "line", {"no fix": fix == 0.0})},
         clock=Clock.shifted("GPS weeks", columns["time_log_s"], time),
         lost=[(len(lines) - len(found), "line", f"of {len(lines)} could not be read")],
-        notes=["places are the camera's: the way from the antenna is in them already"],
+        notes=["places are those of the camera, not the antenna"],
     )
 
 

@@ -191,7 +191,7 @@ class Labels:
         if given is not None and width and given != (width, height):
             raise WildlabError(
                 f"says {given[0]} x {given[1]} pixels, and {printable(frame)} has {width} x {height}",
-                "give the images that the boxes were drawn in, or labels of these",
+                "give the images that were labelled",
                 file=self.path,
                 field=f"the image {printable(name)}",
             )
@@ -412,7 +412,7 @@ def read_json_boxes(
         return _megadetector(check_model(Batch, found, path), path)
     raise WildlabError(
         f"is JSON with {', '.join(map(printable, sorted(keys)[:8])) or 'no key'}, of no format that is known",
-        "give COCO (images, annotations, categories), a list of COCO results, or a batch of MegaDetector",
+        "give COCO's truth or results, or a batch of MegaDetector",
         file=path,
     )
 
@@ -450,7 +450,7 @@ def _truth(found: Truth, path: Path, group: str | None) -> Marked:
         ids=names,
         categories=categories,
         groups=groups if group else None,
-        left_out=_counted("annotation without a box, whose image is not judged", len(unjudged)),
+        left_out=_counted("annotation without a box: image not judged", len(unjudged)),
     )
 
 
@@ -472,7 +472,7 @@ def _results(found: list[Result], path: Path, truth: Marked | None) -> Marked:
     ]
     if found and not rows:
         problem = f"none of {len(found)} results is of an image of the labels"
-        fix = "give the COCO file of the same images with --labels"
+        fix = "give COCO of the same images with --labels"
         raise WildlabError(problem, fix, file=path, field="image_id")
     table = box_table(rows)
     return Marked(
@@ -648,14 +648,14 @@ def read_table(data: bytes, path: Path, *, group: str | None = None, clicks: boo
     wrong = ~np.isfinite(given).all(axis=1) | (given[:, 2:] < 0).any(axis=1)
     given[wrong] = np.nan
     if (given[:, 2:] > 0).any() and (np.abs(given[~wrong]) <= 1).all():
-        fix = "give pixels, or the folder of text files that they are from (YOLO)"
-        raise fail("the boxes are shares of the image: none is wider or farther than 1", fix, ", ".join(way))
+        fix = "give pixels, or YOLO's folder of text files"
+        raise fail("the boxes are shares of the image", fix, ", ".join(way))
     empty = np.array([{row[one].strip().lower() for one in columns} <= NO_VALUE for row in table.rows])
-    refuse(wrong & ~empty, "give finite numbers, and sizes not below zero; or leave the row out", columns)
+    refuse(wrong & ~empty, "mend it, or leave the row out", columns)
     sure, kinds = find(SCORE_COLUMNS), texts(find(NAME_COLUMNS if clicks else CLASS_COLUMNS))
     scores = numbers([]) if sure is None else table.numbers(sure)
     if sure is not None:
-        refuse(~wrong & np.isnan(scores), "give each box a score, or take the column out", [sure])
+        refuse(~wrong & np.isnan(scores), "give each box a score", [sure])
     found = pd.DataFrame(given, columns=SIDES).assign(
         name=names,
         kind=kinds,

@@ -307,10 +307,7 @@ STILL = ("photos", "marks", "clicks")
 SENSORS = {"f_": 1000.0, "w_": 100.0, "field_": 1000.0}
 #: Parts with angles -> beyond them none is an angle, deg.
 TURNS = {"poses": 361.0, "gimbal": 720.0}
-ONE_HEIGHT = (
-    "the receiver gives one and the same number above the ellipsoid and above sea level: only the latter is "
-    "kept, and may be the former"
-)
+ONE_HEIGHT = "heights above ellipsoid and sea level are the same: they are taken as above sea level"
 _EARTH_M = 6371e3
 
 

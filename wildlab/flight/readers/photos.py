@@ -657,13 +657,13 @@ def _times(tags: list[Tags], zone: str | None) -> tuple[Array, Array, Clock | No
         time = np.where(np.isfinite(wall), wall + middle, sky) if one_clock else sky
         clock = Clock(BY_GPS, 1.0, middle, spread, largest, len(apart))
         if not one_clock:
-            notes.append("the camera's clock does not run along with GPS time in its images, which is used")
+            notes.append("the camera's clock is not steady: GPS time is used")
     elif zone is not None:
         time = wall_to_utc(wall, zone)
         clock = Clock(f"local time of the zone {zone}", 1.0, float(np.nanmedian(time - wall)))
     else:
         time, clock = np.full(len(wall), np.nan), Clock(LOCAL)
-        notes.append("the camera's clock is local time and no image says its zone: state it to know UTC")
+        notes.append("the camera's clock is local time: state its zone")
     without = int((~np.isfinite(wall) & ~np.isfinite(sky)).sum())
     notes += [f"{plural(without, 'image')} without a time"] if without else []
     return wall, time, clock, notes
@@ -682,13 +682,13 @@ def _notes(
                 notes[f"tags contradict each other on the focal length: {both}"] += 1
     rtk = [rtk_of(one) for one in tags]
     fixed = [one in RTK_FIXES for one in rtk]
-    notes["heights with RTK are taken to count from the ellipsoid"] = sum(fixed)
+    notes["heights with RTK count from the ellipsoid"] = sum(fixed)
     if any(fixed):
         notes["RTK was lost: heights count from sea level"] = sum(one >= 0 for one in rtk) - sum(fixed)
-    notes["of the maker's calibration (DewarpData) the focal length is used, the distortion is not"] = sum(
+    notes["distortion of DewarpData is not used"] = sum(
         math.isfinite(dewarped_of(one)) and one.xmp.get("dji:DewarpFlag", "0") != "1" for one in tags
     )
-    notes["DJI's absolute altitude may be tens of metres off (barometer); above take-off is better"] = sum(
+    notes["DJI's absolute altitude may be tens of metres off (barometer)"] = sum(
         "dji:AbsoluteAltitude" in one.xmp and not ok for one, ok in zip(tags, fixed, strict=True)
     )
     several = Counter(one or "a camera without a name" for one in cameras)
@@ -752,7 +752,7 @@ def camera_of(log: RawLog) -> dict[str, Any] | None:
         known_as = ", ".join(one or "one without a name" for one in names)
         raise WildlabError(
             f"the images are of {len(names)} cameras: {known_as}",
-            "give each camera a folder of its own, and name one",
+            "give each camera a folder of its own",
             field="camera",
         )
     width, height = (_one(columns[name][known], what) for name, what in _SIDES)
@@ -764,7 +764,7 @@ def camera_of(log: RawLog) -> dict[str, Any] | None:
         least, most = np.nanmin(focal), np.nanmax(focal)
         raise WildlabError(
             f"the focal length changes from {least:.0f} to {most:.0f} px: the lens zooms",
-            "give the images of each focal length a folder of their own",
+            "give each focal length a folder of its own",
             field="focal_px",
         )
     how = Counter(str(one) for one in columns["focal_from"][known] if one).most_common(1)[0][0]
@@ -785,7 +785,7 @@ def _one(sizes: Array, what: str) -> float:
         given = ", ".join(f"{one:.0f}" for one in found[:5])
         raise WildlabError(
             f"the images are {given} px {what}",
-            "give the images of each size a folder of their own",
+            "give each size a folder of its own",
             field="camera",
         )
     return float(found[0])

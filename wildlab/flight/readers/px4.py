@@ -103,7 +103,7 @@ def decode(path: Path, data: bytes, zone: str | None) -> Decoded:
             topics.setdefault(one.name, Messages(one.name, one.data, rows))
     if not topics:
         raise WildlabError(
-            "holds no message of position, attitude or sensors that can be read",
+            "holds no message of position, attitude or sensors",
             "give the log of a flight",
             file=path,
         )
@@ -112,8 +112,8 @@ def decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     lost_s = sum(one.duration for one in ulog.dropouts) / 1e3
     said = {
         f"the logger fell behind {len(ulog.dropouts)} times and lost {lost_s:.3f} s in all": ulog.dropouts,
-        "the file is damaged: what could not be read is left out": ulog.file_corruption,
-        "no receiver told UTC: its times count from the start of the system alone": log.fit is None,
+        "damaged places are left out": ulog.file_corruption,
+        "UTC is not known: times count from the start of the system": log.fit is None,
     }
     clock = Clock("") if log.fit is None else Clock.fitted("UTC of the receiver", log.fit)
     return Decoded(parts, _vehicle(ulog.msg_info_dict), clock, notes=notes + holding(said))
@@ -151,7 +151,7 @@ def _read(path: Path, data: bytes) -> Any:
             return Bounded(io.BytesIO(data), TOPICS, disable_str_exceptions=True)
     except (ULogException, ValueError, KeyError, IndexError, TypeError, struct.error) as error:
         problem = f"cannot be read ({printable(str(error))[:80]})"
-        raise WildlabError(problem, "copy it again, or export it with PX4's own tools", file=path) from None
+        raise WildlabError(problem, "copy it again", file=path) from None
 
 
 def _utc(topics: Mapping[str, Messages]) -> ClockFit | None:
@@ -230,7 +230,7 @@ def _poses(log: Px4Log, notes: list[str]) -> Readings | None:
     place, local = log.first("vehicle_global_position"), log.first("vehicle_local_position")
     if attitude is None or not attitude.has("q[0]"):
         if place is not None:
-            notes.append(f"{len(place)} positions stand without any attitude: there are no poses")
+            notes.append(f"{len(place)} positions without attitudes make no poses")
         return None
     at = taken_s(attitude)
     if place is not None and (place.has("lat") or place.has("latitude_deg")):

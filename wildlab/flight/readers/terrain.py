@@ -183,7 +183,7 @@ class ElevationMap:
             found = low if low < LOWEST else high
             raise WildlabError(
                 f"has heights of {found:g} m, and on Earth land lies between {LOWEST:g} and {HIGHEST:g} m",
-                "if that stands for a hole, state it as nodata; else check the unit of the heights",
+                "state it as nodata, or check the unit of heights",
                 file=self.path,
                 field="terrain.nodata",
             )
@@ -226,7 +226,7 @@ def open_elevation(path: Path, says: TerrainSays) -> ElevationMap:
         stated = says.crs if says.crs is not None else (data.crs.to_wkt() if data.crs else None)
         if stated is None:
             raise WildlabError(
-                "states no CRS, so nobody knows where it lies",
+                "states no CRS",
                 "name it as crs, EPSG:32633 for instance",
                 file=path,
                 field="terrain.crs",
@@ -286,7 +286,7 @@ def _dataset(path: Path) -> Iterator[Any]:
             data = rasterio.open(path, driver=_driver(path))
         except (RasterioError, ValueError) as error:
             raise WildlabError(
-                f"is not a GeoTIFF or PNG that can be read ({_first_line(error)})",
+                f"cannot be read as GeoTIFF or PNG ({_first_line(error)})",
                 "give the elevation map, whole, as GeoTIFF",
                 file=path,
             ) from None
@@ -302,9 +302,7 @@ def _driver(path: Path) -> str:
         return "GTiff"
     if begins == b"\x89PNG\r\n\x1a\n":
         return "PNG"
-    raise WildlabError(
-        "is neither a TIFF nor a PNG by its first bytes", "give the elevation map as GeoTIFF", file=path
-    )
+    raise WildlabError("is neither TIFF nor PNG", "give the elevation map as GeoTIFF", file=path)
 
 
 def _refuse_layout(data: Any, path: Path) -> None:
@@ -312,7 +310,7 @@ def _refuse_layout(data: Any, path: Path) -> None:
     if data.count != 1:
         raise WildlabError(
             f"has {data.count} bands, and a map of heights has one",
-            "give the band of heights as a file of its own",
+            "give the band of heights alone",
             file=path,
         )
     kind = np.dtype(data.dtypes[0]) if data.dtypes[0] in np.sctypeDict else None
@@ -326,7 +324,7 @@ def _refuse_layout(data: Any, path: Path) -> None:
     if max(rows, columns) > LARGEST_SIDE or block > LARGEST_BLOCK:
         raise WildlabError(
             f"claims {columns:,} x {rows:,} cells in blocks of {block:,} bytes, {LARGEST_BLOCK:,} at most",
-            "give a tiled GeoTIFF of the part about the flight (gdalwarp -co TILED=YES -te ...)",
+            "cut and tile it (gdalwarp -co TILED=YES -te ...)",
             file=path,
         )
     if min(rows, columns) < 2:
@@ -341,7 +339,7 @@ def _refuse_other_crs(states: CRS, said: CRS, path: Path) -> None:
     if not one.equals(other, ignore_axis_order=True):
         raise WildlabError(
             f"states the CRS {printable(states.name)[:60]}, and {printable(said.name)[:60]} is said of it",
-            "leave crs out, or write the right one into the file (gdal_edit -a_srs)",
+            "leave crs out, or mend the file (gdal_edit -a_srs)",
             file=path,
             field="terrain.crs",
         )
@@ -356,7 +354,7 @@ def _placed(data: Any, says: TerrainSays, path: Path, picture: bool) -> Affine:
     if picture or found.is_identity:
         raise WildlabError(
             "does not say where its cells lie",
-            "state cell_m, and corner, the easting and northing of its upper left corner",
+            "state cell_m and corner (upper left, easting and northing)",
             file=path,
             field="terrain.corner",
         )

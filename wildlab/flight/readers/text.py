@@ -195,9 +195,7 @@ def read_text_table(data: bytes, path: Path) -> TextTable:
     """
     told = _told(decode(data).replace("\0", ""))
     if not told or _sign(told[0][1]) not in told[0][1]:
-        raise WildlabError(
-            "has no header of columns", "write it as CSV with a first line of names", file=path
-        )
+        raise WildlabError("has no header of columns", "write CSV with a line of names", file=path)
     sign = _sign(told[0][1])
 
     def values(line: str) -> list[str]:

@@ -259,13 +259,9 @@ def find_boot(frames: Telemetry, system: int, component: int) -> Boot | None:
     base = "UTC of the messages SYSTEM_TIME" if from_vehicle[main] else "times of receipt"
     middle = f"{np.median(late):.3f} s (median)"
     notes = {
-        "UTC of its messages SYSTEM_TIME is more than a day from their receipt, and not used": (
-            said.any() and not believed
-        ),
+        "SYSTEM_TIME is more than a day from its receipt, and not used": (said.any() and not believed),
         f"the ground station received {middle} after the vehicle's UTC": from_vehicle[main],
-        f"UTC is the ground station's, fitted along the earliest receipts; others are {middle} later": (
-            not from_vehicle[main]
-        ),
+        f"UTC is fitted along the earliest receipts; others are {middle} later": (not from_vehicle[main]),
         f"the vehicle was switched on {len(starts)} times; each run has a clock of its own": len(starts) > 1,
         "the vehicle's stamps are of several clocks": falls >= MOST_RUNS,
     }
@@ -335,8 +331,8 @@ def decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     frames = walk(data)
     if not frames.sound:
         raise WildlabError(
-            "holds no sound MAVLink frame behind a time of receipt",
-            "give the .tlog that the ground station wrote",
+            "holds no sound MAVLink frame",
+            "give the .tlog of the ground station",
             file=path,
         )
     vehicles, stations = _systems(frames)
@@ -412,7 +408,7 @@ def _poses(vehicle: Vehicle, notes: list[str]) -> Readings | None:
     attitude, position = vehicle.own("ATTITUDE"), vehicle.own("GLOBAL_POSITION_INT")
     if not len(attitude):
         if len(position):
-            notes.append(f"{len(position)} positions stand without any attitude: there are no poses")
+            notes.append(f"{len(position)} positions without attitudes make no poses")
         return None
     columns = {name: np.degrees(attitude.get(name[:-4])) for name in ANGLES}
     place = position.columns(LAT_LON, 1e7)

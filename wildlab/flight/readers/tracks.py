@@ -141,7 +141,7 @@ def nmea_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     count = plural(int(left.sum()), "position")
     notes = {
         f"{count} of other talkers ({', '.join(sorted(left.index))}) left aside": len(left),
-        "no sentence carries a date (RMC, ZDA): times are of a day that is not known": not timed,
+        "no sentence carries a date (RMC, ZDA): UTC is not known": not timed,
     }
     columns = {"time_s": utc, "time_log_s": place["time"].to_numpy(float), **_columns(found)}
     unusable = {"no fix": found["no_fix"], "estimated, not measured": place["guessed"].to_numpy(bool)}
@@ -538,7 +538,7 @@ def gpx_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
         raise WildlabError(problem, "export the recorded track, not a route or waypoints", file=path)
     columns = {name: one[placed] for name, one in columns.items()}
     timed = int((columns["time_s"] >= GPS_START_S).sum())
-    notes = ["no point carries a time that can be true: as a track over time it is of no use"]
+    notes = ["no point carries a time that can be true"]
     return _in_order_of_time(
         Decoded(
             {"gnss": Readings(columns, None, "point", {"no fix": columns["fix"] == 0.0})},
@@ -560,7 +560,7 @@ def _in_order_of_time(found: Decoded) -> Decoded:
     columns, reasons = (
         {name: one[order] for name, one in given.items()} for given in (part.columns, part.unusable)
     )
-    notes = [*found.notes, "rows are not in order of time in the file; they were put in order"]
+    notes = [*found.notes, "rows were put in order of time"]
     part = part._replace(columns=columns, rows=rows, unusable=reasons)
     return Decoded({"gnss": part}, clock=found.clock, lost=found.lost, notes=notes)
 
@@ -639,7 +639,7 @@ def pos_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     bad = len(cells) - len(rows) if names else len(cells)
     if not rows or not names:
         problem = "has no position" + (f"; {plural(bad, 'line')} cannot be read" if bad else "")
-        raise WildlabError(problem, "write the solution of RTKLIB again, with its header", file=path)
+        raise WildlabError(problem, "write it again with a header", file=path)
     flat = [cell for _, _, row in rows for cell in (row + [""] * len(names))[: len(names)]]
     values = named((name.partition("(")[0] for name in names), numbers(flat).reshape(len(rows), -1).T)
 

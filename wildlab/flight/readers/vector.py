@@ -91,7 +91,7 @@ def _ring(words: str, path: Path) -> Array:
         return np.array(places, float).reshape(-1, 3)
     except ValueError:
         problem = f"{printable(words.strip()[:40])!r} is no coordinate"
-        fix = "give longitude,latitude with a comma and without blanks between them"
+        fix = "give longitude,latitude without blanks"
         raise WildlabError(problem, fix, file=path, field="coordinates") from None
 
 
@@ -187,7 +187,7 @@ def _geojson(data: bytes, path: Path) -> tuple[list[Place], int]:
     given = check_model(Features, content, path)
     if given.crs and not WGS84.fullmatch(given.crs.properties.name.strip().replace("::", ":")):
         problem = f"is in {printable(given.crs.properties.name)[:60]}, and WGS84 is wanted"
-        fix = "write longitude and latitude in degrees (EPSG:4326)"
+        fix = "convert it to EPSG:4326"
         raise WildlabError(problem, fix, file=path, field="crs")
     found: list[Place] = []
     others = 0
@@ -316,7 +316,7 @@ def parse_areas(data: bytes, path: Path) -> Areas:
     """
     found = [one for one in read_places(data, path)[0] if not one.is_point]
     if not 0 < len(found) <= MOST_AREAS:
-        fix = "draw the outline of each area to be searched as a polygon"
+        fix = "draw each area as a polygon"
         many = f"{len(found):,} polygons, and {MOST_AREAS} are the most" if found else "no polygon"
         raise WildlabError(f"has {many}", fix, file=path)
     names = _names([one.name for one in found])
@@ -424,13 +424,13 @@ def checked_ring(ring: Array, what: str, path: Path) -> Array:
     _refuse(not np.isfinite(ring).all(), f"a point of {what} is no finite number", "give degrees", path)
     east, north = np.abs(ring).max(axis=0)
     degrees = f"{what} has a coordinate of {max(east, north):g}, which is no degree"
-    fix = "give longitude and latitude in degrees of WGS84 (EPSG:4326), not metres of a map projection"
+    fix = "give longitude and latitude in degrees of WGS84 (EPSG:4326)"
     _refuse(max(east, north) > 180, degrees, fix, path)
     swapped = ": its coordinates are swapped" if east <= 90 else ""
     latitude = f"{what} has a latitude of {north:g} degrees{swapped}"
     _refuse(north > 90, latitude, "give longitude first, then latitude", path)
     span = float(np.ptp(ring[:, 0]))
-    fix = "split an area that crosses the antimeridian into a polygon on each side"
+    fix = "split it at the antimeridian"
     _refuse(span > 180, f"the longitudes of {what} span {span:.0f} degrees", fix, path)
     return ring
 
@@ -439,11 +439,11 @@ def _check_shape(ring: Array, what: str, path: Path) -> None:
     """Refuse a ring (K, 2) in metres that is far away, bounds nothing, or is not sure what it bounds."""
     far = float(np.hypot(*ring.T).max()) / 1000
     away = f"{what} lies {far:,.0f} km from the middle of all areas"
-    _refuse(far > FURTHEST / 1000, away, "check its coordinates, or plan far areas by themselves", path)
+    _refuse(far > FURTHEST / 1000, away, "plan far areas by themselves", path)
     met = crossing(ring)
     sides = [f"the side after point {one + 1}" for one in met or ()]
     crosses = f"{what} crosses itself: {' meets '.join(sides)}"
-    _refuse(met, crosses, "put its points in their order along the fence", path)
+    _refuse(met, crosses, "put its points in order", path)
     size = ring_area(ring)
     _refuse(size < LEAST_AREA, f"{what} bounds {size:.2g} square metres", "check its coordinates", path)
 
@@ -568,11 +568,8 @@ def _marks(path: Path, data: bytes, height: str) -> Decoded:
     columns = {"name": [one.name for one in points], "longitude_deg": longitude, "latitude_deg": latitude}
     known = np.isfinite(high)
     notes = {
-        "heights count from the ellipsoid, as the standard of GeoJSON has them": (
-            height == "height_ellipsoid_m" and known.any()
-        ),
-        f"{int((~known).sum())} of {len(known)} points have no height above sea level: write "
-        "<altitudeMode>absolute</altitudeMode> before <coordinates>, or give a table": (
+        "heights count from the ellipsoid": (height == "height_ellipsoid_m" and known.any()),
+        f"{int((~known).sum())} of {len(known)} points have no height: altitudeMode is not absolute": (
             height == "height_sea_m" and not known.all()
         ),
     }
@@ -623,11 +620,11 @@ def table_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     there = printable(", ".join(table.header[:12]))[:200]
     north, east = _find(names, "latitude"), _find(names, "longitude")
     if north is None or east is None:
-        fix = "name two columns latitude and longitude, in degrees of WGS 84"
+        fix = "name two columns latitude and longitude (deg)"
         what = f"has no latitude and longitude: {there}"
         if _metres(names):
             what = f"has eastings and northings and no degrees: {there}"
-            fix = f"convert them (nothing here says which projection they are of), and {fix}"
+            fix = f"convert them, and {fix}"
         raise WildlabError(what, fix, file=path)
     words = {at: set(name.split("_")) for at, name in enumerate(names) if at not in (north, east)}
     ways = (("height_ellipsoid_m", ELLIPSOID, HIGH), ("height_sea_m", SEA, HIGH | SEA))

@@ -298,9 +298,7 @@ def open_frames(
         capture.release()
         known = np.isfinite(claimed) and 0 < claimed <= MOST_FRAMES
         return Frames(path, (), int(claimed) if known else None, polarity, even=even)
-    raise WildlabError(
-        f"the name ends in {path.suffix!r}", f"give a folder, or a file in one of {kinds}", file=path
-    )
+    raise WildlabError(f"the name ends in {path.suffix!r}", f"give a folder, or one of {kinds}", file=path)
 
 
 def _grey(image: NDArray[Any]) -> NDArray[Any]:
@@ -343,7 +341,7 @@ def mark_shutter(frames: Iterable[Frame], held_can_be_told: bool) -> Iterator[Fr
         run = run + 1 if before is not None and are_alike(before, frame.image) else 1
         before = frame.image
         if is_shutter(frame.image, frame.valid):
-            said = "the shutter is closed: it shows noise and nothing else (flat-field correction)"
+            said = "the shutter is closed (flat-field correction)"
             yield spoilt(frame.name, said, frame.time)
         elif held_can_be_told and run >= HELD:
             said = f"its picture is held: it repeats the {HELD - 1} frames before it to the last bit"
@@ -382,7 +380,7 @@ def open_video(path: Path) -> Any:
     WildlabError
         Where it is no such file, claims too large a picture or cannot be decoded.
     """
-    fix = "give a video as MP4, MOV, AVI or MKV, or a folder of its frames as images"
+    fix = "give MP4, MOV, AVI or MKV, or a folder of images"
     try:
         regular_size(path, MOST_BYTES)
         with path.open("rb") as stream:

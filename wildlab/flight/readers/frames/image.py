@@ -53,7 +53,7 @@ def open_image(stream: BinaryIO, *, whole: bool = False) -> Image.Image | str:
     Examples
     --------
     >>> open_image(io.BytesIO(b"GIF89a"))
-    'it is no PNG, JPEG or TIFF file that can be read'
+    'it is no PNG, JPEG or TIFF'
     """
     try:
         with warnings.catch_warnings():
@@ -67,7 +67,7 @@ def open_image(stream: BinaryIO, *, whole: bool = False) -> Image.Image | str:
     except Image.DecompressionBombError:
         pixels = MOST_PIXELS + 1
     except Exception:  # Pillow raises whatever comes first of a broken header
-        return "it is no PNG, JPEG or TIFF file that can be read"
+        return "it is no PNG, JPEG or TIFF"
     if pixels > MOST_PIXELS:
         return f"it claims more than {MOST_PIXELS:,} pixels, the most that is decoded"
     return found
@@ -100,7 +100,7 @@ def pixels_of(image: Image.Image, data: bytes) -> NDArray[Any] | str:
     if found.ndim < 2 or found.shape[:2] != (image.height, image.width):
         return "the file is cut off or damaged"
     if deep:
-        return "it is a colour image of 16 bits, and 8 are read"
+        return "it is a colour image of 16 bits"
     return found.astype(np.uint16) if image.mode.startswith("I;16") else found
 
 
@@ -297,14 +297,8 @@ def to_kelvin(counts: NDArray[np.uint16], planck: Planck) -> NDArray[np.float32]
 # -- DJI
 
 #: What is said of such a file.
-AS_COUNTS = (
-    "DJI's thermal data (APP3) are read as counts: only DJI's own library, which is not open, makes "
-    "temperatures of them"
-)
-AS_PREVIEW = (
-    "DJI's thermal data (APP3) have another size than the picture and are not read: the preview picture is "
-    "used, with its own gain and palette"
-)
+AS_COUNTS = "DJI's thermal data (APP3) are read as counts, since only DJI's library knows temperatures"
+AS_PREVIEW = "DJI's thermal data (APP3) have another size than the picture: the preview is used instead"
 #: The fewest bytes of APP3 that are taken for an image: others keep small notes there.
 LEAST = 4096
 
@@ -513,7 +507,7 @@ def _turned(image: Image.Image) -> str:
     if orientation in (None, 1) or not isinstance(orientation, int):
         return ""
     return (
-        f"some images say that viewers are to show them turned (EXIF orientation {orientation}): pixels and "
+        f"some images are shown turned (EXIF orientation {orientation}): pixels and "
         "labels count in the image as it is stored"
     )
 
@@ -592,9 +586,9 @@ def as_grey_or_colour(image: NDArray[Any]) -> tuple[NDArray[Any], Unit] | str:
         kelvin = image.astype(np.float32)
         plausible = np.isfinite(kelvin) & (kelvin > 100) & (kelvin < HOTTEST)
         if plausible.mean() < 0.5:
-            return "it holds floating-point numbers that are no temperatures in kelvin"
+            return "its floats are no temperatures in kelvin"
         return np.where(plausible, kelvin, np.float32(np.nan)), "kelvin"
-    return f"its numbers are of the kind {image.dtype}, and 8 or 16 bits without sign are read"
+    return f"its numbers are of the kind {image.dtype}, and 8 or 16 bits are read"
 
 
 def _radiometric(records: bytes) -> tuple[NDArray[Any], Unit] | str:
@@ -680,7 +674,7 @@ def images_below(folder: Path, ids: Collection[str]) -> list[Path]:
                 both = [printable(one.parent.relative_to(folder).as_posix()) for one in (found[name], path)]
                 raise WildlabError(
                     f"{printable(name)}, a frame of the flight, is in {both[0]} and in {both[1]}",
-                    f"name the folder that the flight has its images from: {both[0]} or {both[1]} in it",
+                    f"name one of both: {both[0]} or {both[1]} in it",
                     file=folder,
                     field="--images",
                 )

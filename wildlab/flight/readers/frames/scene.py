@@ -184,8 +184,8 @@ def problem_of(image: NDArray[Any], valid: Mask) -> str:
         top = np.iinfo(image.dtype).max - (2 if image.dtype == np.uint8 else 0)
         share = float((image >= top).mean())
         if share > 0.5:
-            return f"{share:.0%} of the pixels are at the highest value: the picture is saturated"
-    return "" if valid.any() else "no pixel shows the scene: all are border, overlay or clipped"
+            return f"{share:.0%} of the pixels are saturated"
+    return "" if valid.any() else "no pixel shows the scene"
 
 
 # -- shutters
