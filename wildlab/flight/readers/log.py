@@ -339,14 +339,14 @@ def judge_log(format_: str, found: Decoded, track: bool) -> RawLog:
         for name in ("poses", "gnss"):
             if name in parts:
                 parts[name].columns.pop("height_ellipsoid_m", None)
-    streams = {name: _stream(name, one) for name, one in parts.items()}
+    streams = {
+        name: make_stream(
+            name, one.columns, one.rows, one.counted_in, one.unusable if name in STILL else judge(name, one)
+        )
+        for name, one in parts.items()
+    }
     lost = tuple(f"{plural(count, what)} {rest}".rstrip() for count, what, rest in found.lost if count)
     return RawLog(format_, streams, found.vehicle, found.clock, lost, tuple(dict.fromkeys(notes)))
-
-
-def _stream(name: str, one: Readings) -> Any:
-    wrong = one.unusable if name in STILL else judge(name, one)
-    return make_stream(name, one.columns, one.rows, one.counted_in, wrong)
 
 
 def _filled(part: str, one: Readings) -> dict[str, Any]:

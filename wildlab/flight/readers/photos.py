@@ -19,6 +19,7 @@ import struct
 import warnings
 from collections import Counter
 from dataclasses import dataclass, field, replace
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -42,7 +43,18 @@ from wildlab.flight.readers.frames.image import (
     record_order,
     segments_of,
 )
-from wildlab.flight.readers.log import ANGLES, WORLD, Array, Clock, Decoded, RawLog, Readings, any_of, named
+from wildlab.flight.readers.log import (
+    ANGLES,
+    WORLD,
+    Array,
+    Clock,
+    Decoded,
+    RawLog,
+    Readings,
+    any_of,
+    holding,
+    named,
+)
 from wildlab.flight.readers.text import LATEST_S, plural, stamp_s
 from wildlab.flight.units import wall_to_utc
 
@@ -386,13 +398,11 @@ def _stamp(said: str) -> float:
 
 
 def _offset(said: str) -> float:
-    if said == "Z":
-        return 0.0
-    found = re.fullmatch(r"([+-])(\d\d):?(\d\d)", said.strip())
-    if found is None or int(found[2]) > 14 or int(found[3]) > 59:
+    try:
+        offset = datetime.strptime(said.strip(), "%z").utcoffset()
+    except ValueError:
         return NAN
-    size = 3600.0 * int(found[2]) + 60.0 * int(found[3])
-    return -size if found[1] == "-" else size
+    return NAN if offset is None else _within(offset.total_seconds(), -54001, 54001)
 
 
 # -- focal lengths
@@ -630,43 +640,36 @@ def _times(tags: list[Tags], zone: str | None) -> tuple[Array, Array, Clock | No
     """
     wall, ahead = np.array([wall_of(one) for one in tags], float).reshape(-1, 2).T
     sky = np.array([satellite_time_of(one) for one in tags], float)
+    both, stated = np.isfinite(sky - wall), np.isfinite(ahead)
     if not np.isfinite(wall).any():
-        if not np.isfinite(sky).any():
-            return wall, sky, None, ["no image carries a time"]
-        return sky, sky, Clock(BY_GPS), []
-    notes: list[str] = []
-    apart = (sky - wall)[np.isfinite(wall) & np.isfinite(sky)]
-    middle = float(np.median(apart)) if len(apart) else np.nan
-    left = np.abs(apart - middle)
-    spread, largest = (1.4826 * float(np.median(left)), float(left.max())) if len(apart) else (0.0, 0.0)
-    one_clock = spread <= ONE_CLOCK_S
-    stated = np.isfinite(ahead)
-    if stated.any() and (stated.all() or not len(apart)):
+        timed = bool(np.isfinite(sky).any())
+        return sky, sky, Clock(BY_GPS) if timed else None, [] if timed else ["no image carries a time"]
+    apart = float(np.median((sky - wall)[both])) if both.any() else NAN
+    zone_s = float(np.median(ahead[stated])) if stated.any() else NAN
+    left = np.abs((sky - wall)[both] - apart)
+    spread = 1.4826 * float(np.median(left)) if both.any() else 0.0
+    if stated.any() and (stated.all() or not both.any()):
         # Where one image does not state its zone, the others' is that of the same clock.
-        zone_s = float(np.median(ahead[stated]))
-        time, clock = (
-            wall - np.where(stated, ahead, zone_s),
-            Clock(BY_ZONE, 1.0, -zone_s, pairs=int(stated.sum())),
-        )
-        off = middle + zone_s
-        if len(apart) and one_clock and abs(off) > OFF_S:
-            notes.append(
-                f"the camera's clock, which is used, is {-off:+.0f} s from the GPS time in the images"
-            )
-    elif len(apart):
-        time = np.where(np.isfinite(wall), wall + middle, sky) if one_clock else sky
-        clock = Clock(BY_GPS, 1.0, middle, spread, largest, len(apart))
-        if not one_clock:
-            notes.append("the camera's clock is not steady: GPS time is used")
+        time = wall - np.where(stated, ahead, zone_s)
+        clock = Clock(BY_ZONE, offset_s=-zone_s, pairs=int(stated.sum()))
+    elif both.any():
+        time = np.where(np.isfinite(wall), wall + apart, sky) if spread <= ONE_CLOCK_S else sky
+        clock = Clock(BY_GPS, 1.0, apart, spread, float(left.max()), len(left))
     elif zone is not None:
         time = wall_to_utc(wall, zone)
-        clock = Clock(f"local time of the zone {zone}", 1.0, float(np.nanmedian(time - wall)))
+        clock = Clock(f"local time of the zone {zone}", offset_s=float(np.nanmedian(time - wall)))
     else:
-        time, clock = np.full(len(wall), np.nan), Clock(LOCAL)
-        notes.append("the camera's clock is local time: state its zone")
-    without = int((~np.isfinite(wall) & ~np.isfinite(sky)).sum())
-    notes += [f"{plural(without, 'image')} without a time"] if without else []
-    return wall, time, clock, notes
+        time, clock = np.full(len(wall), NAN), Clock(LOCAL)
+    without = int(np.isnan(np.fmax(wall, sky)).sum())
+    notes = {
+        f"the camera's clock, which is used, is {-(apart + zone_s):+.0f} s from the GPS time in the images": (
+            clock.base == BY_ZONE and spread <= ONE_CLOCK_S and abs(apart + zone_s) > OFF_S
+        ),
+        "the camera's clock is not steady: GPS time is used": clock.base == BY_GPS and spread > ONE_CLOCK_S,
+        "the camera's clock is local time: state its zone": clock.base == LOCAL,
+        f"{plural(without, 'image')} without a time": without,
+    }
+    return wall, time, clock, holding(notes)
 
 
 def _notes(
@@ -747,45 +750,27 @@ def camera_of(log: RawLog) -> dict[str, Any] | None:
     known = np.isfinite(columns["width_px"]) & np.isfinite(columns["height_px"])
     if not known.any():
         return None
-    names = sorted({str(one) for one in columns["camera"][known]})
-    if len(names) > 1:
-        known_as = ", ".join(one or "one without a name" for one in names)
-        raise WildlabError(
-            f"the images are of {len(names)} cameras: {known_as}",
-            "give each camera a folder of its own",
-            field="camera",
-        )
-    width, height = (_one(columns[name][known], what) for name, what in _SIDES)
+
+    def one(name: str, what: str) -> Any:
+        found = sorted(set(columns[name][known].tolist()))
+        if len(found) > 1:
+            said = ", ".join(str(each) or "one without a name" for each in found[:5])
+            problem = f"the images are of {len(found)} {what}: {said}"
+            raise WildlabError(problem, "give each a folder of its own", field="camera")
+        return found[0]
+
+    camera, width, height = one("camera", "cameras"), one("width_px", "widths"), one("height_px", "heights")
     focal = columns["focal_px"][known]
     if not np.isfinite(focal).any():
         return None
     middle = float(np.nanmedian(focal))
     if np.nanmax(np.abs(focal / middle - 1)) > 0.02:
         least, most = np.nanmin(focal), np.nanmax(focal)
-        raise WildlabError(
-            f"the focal length changes from {least:.0f} to {most:.0f} px: the lens zooms",
-            "give each focal length a folder of its own",
-            field="focal_px",
-        )
-    how = Counter(str(one) for one in columns["focal_from"][known] if one).most_common(1)[0][0]
+        problem = f"the focal length changes from {least:.0f} to {most:.0f} px: the lens zooms"
+        raise WildlabError(problem, "give each focal length a folder of its own", field="focal_px")
+    how = Counter(str(each) for each in columns["focal_from"][known] if each).most_common(1)[0][0]
     if how == BY_FILM:
         film = float(np.nanmedian(columns["focal_35mm"][known]))
         how += f" of {film:g} mm over the diagonal, rounded to within {50 / film:.0f} %"
-    return {
-        "camera": names[0],
-        "width_px": int(width),
-        "height_px": int(height),
-        "focal_px": middle,
-        "how": how,
-    }
-
-
-def _one(sizes: Array, what: str) -> float:
-    if len(found := sorted(set(sizes.tolist()))) > 1:
-        given = ", ".join(f"{one:.0f}" for one in found[:5])
-        raise WildlabError(
-            f"the images are {given} px {what}",
-            "give each size a folder of its own",
-            field="camera",
-        )
-    return float(found[0])
+    sizes = {"width_px": int(width), "height_px": int(height)}
+    return {"camera": camera, **sizes, "focal_px": middle, "how": how}

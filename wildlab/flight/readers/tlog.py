@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.flight.clock_fitting import ClockFit, fit_steady
@@ -205,7 +204,7 @@ class Boot(NamedTuple):
     middle of what receipts are behind UTC. `clock`: of the longest run. `notes`: sentences.
     """
 
-    first: NDArray[np.int64]
+    first: Array
     rate: Array
     offset_s: Array
     behind_s: Array
@@ -223,12 +222,10 @@ class Boot(NamedTuple):
 def find_boot(frames: Telemetry, system: int, component: int) -> Boot | None:
     """The clock of an autopilot; None where nothing that it sent has a stamp."""
     kinds = {name: frames.of(name, system, component) for name in _STAMPED}
-    number = np.concatenate([one.rows for one in kinds.values()])
+    stamps = [(one.rows, one.get("time_boot_ms") / 1e3, one.get("received_s")) for one in kinds.values()]
+    number, own, received = np.concatenate(stamps, axis=1)
     order = np.argsort(number, kind="stable")
-    own = np.concatenate([one.get("time_boot_ms") for one in kinds.values()])[order] / 1e3
-    received = np.concatenate([one.get("received_s") for one in kinds.values()])[order]
-    known = own > 0
-    number, own, received = number[order][known], own[known], received[known]
+    number, own, received = (one[order][own[order] > 0] for one in (number, own, received))
     if not len(own):
         return None
     starts = np.r_[0, 1 + np.flatnonzero(np.diff(own) < -RESTART_S)]
@@ -243,18 +240,19 @@ def find_boot(frames: Telemetry, system: int, component: int) -> Boot | None:
     near = said & (np.abs(unix - told.get("received_s")) < DAY_S)
     believed = bool(near.sum() > said.sum() / 2)
     fits: list[ClockFit] = []
-    behind: list[float] = []
     from_vehicle: list[bool] = []
-    late = np.empty(len(own))
     for a, b in zip(starts, ends, strict=True):
-        fit = fit_steady(own[a:b], received[a:b], late=True)
         inside = near & (told.rows >= number[a]) & (told.rows <= number[b - 1])
         from_vehicle.append(believed and int(inside.sum()) > 2)
-        if from_vehicle[-1]:
-            fit = fit_steady(told.get("time_boot_ms")[inside] / 1e3, unix[inside])
-        fits.append(fit)
-        behind.append(float(np.median(received[a:b] - fit.to_reference(own[a:b]))))
-        late[a:b] = received[a:b] - fit.offset_s - fit.rate * own[a:b]
+        fits.append(
+            fit_steady(told.get("time_boot_ms")[inside] / 1e3, unix[inside])
+            if from_vehicle[-1]
+            else fit_steady(own[a:b], received[a:b], late=True)
+        )
+    rate, offset_s = np.array([(one.rate, one.offset_s) for one in fits]).T
+    run = np.repeat(np.arange(len(starts)), ends - starts)
+    late = received - offset_s[run] - rate[run] * own
+    behind = np.array([np.median(late[a:b]) for a, b in zip(starts, ends, strict=True)])
     main = int(np.argmax(ends - starts))
     base = "UTC of the messages SYSTEM_TIME" if from_vehicle[main] else "times of receipt"
     middle = f"{np.median(late):.3f} s (median)"
@@ -265,9 +263,8 @@ def find_boot(frames: Telemetry, system: int, component: int) -> Boot | None:
         f"the vehicle was switched on {len(starts)} times; each run has a clock of its own": len(starts) > 1,
         "the vehicle's stamps are of several clocks": falls >= MOST_RUNS,
     }
-    rate, offset_s = np.array([(one.rate, one.offset_s) for one in fits]).T
     clock = Clock.fitted(base, fits[main])
-    return Boot(number[starts], rate, offset_s, np.array(behind), clock, holding(notes))
+    return Boot(number[starts], rate, offset_s, behind, clock, holding(notes))
 
 
 class Vehicle(NamedTuple):

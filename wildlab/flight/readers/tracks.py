@@ -254,7 +254,7 @@ def _degrees(value: Array, side: pd.Series) -> Array:
 
 #: Class and number of messages.
 PVT, POSLLH, VELNED = (0x01, 0x07), (0x01, 0x02), (0x01, 0x12)
-TIMEGPS, TIMEUTC, SOL, STATUS, DOP = (0x01, 0x20), (0x01, 0x21), (0x01, 0x06), (0x01, 0x03), (0x01, 0x04)
+TIMEGPS, SOL, DOP = (0x01, 0x20), (0x01, 0x06), (0x01, 0x04)
 NAV_ATT, HNR_ATT, HNR_PVT = (0x01, 0x05), (0x28, 0x01), (0x28, 0x00)
 #: Sync, class, number, length; then the payload and two bytes of checksum.
 _SYNC, _HEADER, _CHECK = (0xB5, 0x62), 6, 2
@@ -288,9 +288,7 @@ LAYOUTS: dict[tuple[int, int], Any] = {
         POSLLH: f"itow:u4, {_PLACE}, h_acc v_acc:u4",
         VELNED: "itow:u4, vel_n vel_e vel_d:i4, speed_3d speed:u4, course:i4, s_acc:u4",
         TIMEGPS: "itow:u4, ftow:i4, week:i2, leap:i1, valid:u1",
-        TIMEUTC: f"itow time_acc:u4, nano:i4, {_DATE}, valid:u1",
         SOL: "itow:u4, ftow:i4, week:i2, fix flags:u1, +35, satellites:u1",
-        STATUS: "itow:u4, fix flags:u1",
         DOP: "itow:u4, +8, hdop:u2",
         NAV_ATT: _ATTITUDE,
         HNR_ATT: _ATTITUDE,
@@ -445,7 +443,7 @@ def _of_old(found: UbxFrames) -> Readings | None:
     if not len(rows):
         return None
     own = rows["own_s"].to_numpy()
-    moving, status = found.at(own, VELNED), found.at(own, SOL).combine_first(found.at(own, STATUS))
+    moving, status = found.at(own, VELNED), found.at(own, SOL)
     fix, flags = status["fix"], status["flags"].fillna(1).astype(int)
     kinds = fix.map(_FIXES).to_numpy()
     columns = {
@@ -464,8 +462,7 @@ def _of_old(found: UbxFrames) -> Readings | None:
 
 def _weeks_to_utc(found: UbxFrames, own: Array) -> Array:
     """UTC of times of week, by the messages that know both."""
-    rows = found.rows(TIMEUTC)
-    pairs = [(rows["own_s"], np.where(rows["valid"] & 4, _utc(rows), np.nan))]
+    pairs = []
     # Both bits: the week and the time in it; they stand at different places.
     for kind, field, bits in ((TIMEGPS, "valid", 3), (SOL, "flags", 12)):
         rows = found.rows(kind)

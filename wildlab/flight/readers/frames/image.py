@@ -15,7 +15,6 @@ not open. Cameras of DJI with a sensor of FLIR (XT, XT2) write FLIR's records in
 from __future__ import annotations
 
 import io
-import os
 import struct
 import warnings
 from collections.abc import Collection, Iterator
@@ -664,19 +663,17 @@ def images_below(folder: Path, ids: Collection[str]) -> list[Path]:
     wanted = {str(one) for one in ids}
     stems = {Path(one).stem for one in wanted}
     found: dict[str, Path] = {}
-    for here, folders, files in os.walk(folder):
-        folders[:] = sorted(one for one in folders if not one.startswith("."))
-        for name in sorted(files):
-            path = Path(here) / name
-            if path.suffix.lower() not in SUFFIXES or (name not in wanted and path.stem not in stems):
-                continue
-            if name in found:
-                both = [printable(one.parent.relative_to(folder).as_posix()) for one in (found[name], path)]
-                raise WildlabError(
-                    f"{printable(name)}, a frame of the flight, is in {both[0]} and in {both[1]}",
-                    f"name one of both: {both[0]} or {both[1]} in it",
-                    file=folder,
-                    field="--images",
-                )
-            found[name] = path
+    for path in sorted(folder.rglob("*")):
+        hidden = any(part.startswith(".") for part in path.relative_to(folder).parts)
+        if hidden or path.suffix.lower() not in SUFFIXES or not {path.name, path.stem} & (wanted | stems):
+            continue
+        other = found.setdefault(path.name, path)
+        if other != path:
+            both = [printable(one.parent.relative_to(folder).as_posix()) for one in (other, path)]
+            raise WildlabError(
+                f"{printable(path.name)}, a frame of the flight, is in {both[0]} and in {both[1]}",
+                f"name one of both: {both[0]} or {both[1]} in it",
+                file=folder,
+                field="--images",
+            )
     return sorted(found.values())
