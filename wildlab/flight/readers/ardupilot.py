@@ -23,31 +23,29 @@ from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.flight.clock_fitting import fit_steady
-from wildlab.flight.readers.autopilot import (
+from wildlab.flight.readers.log import (
+    ANGLES,
     FIELD,
     FIX_PLANE,
     FIX_SPACE,
     IMU,
-    Columns,
-    Messages,
-    at_times,
-    usable,
-)
-from wildlab.flight.readers.log import (
-    ANGLES,
     VELOCITY,
     WORLD,
     Array,
     Clock,
+    Columns,
     Decoded,
     Mask,
+    Messages,
     Readings,
     any_of,
+    at_times,
     holding,
     in_order,
     level_velocity,
     named,
     placed,
+    usable,
 )
 from wildlab.flight.schema import BOUNDS
 from wildlab.flight.units import week_to_utc

@@ -19,29 +19,27 @@ import numpy as np
 from wildlab.errors import WildlabError
 from wildlab.flight.clock_fitting import ClockFit, fit_steady
 from wildlab.flight.files import printable
-from wildlab.flight.readers.autopilot import (
+from wildlab.flight.readers.log import (
+    ANGLES,
     FIELD,
     FIX_SPACE,
     IMU,
     LAT_LON,
-    Messages,
-    at_times,
-    device_angles,
-    euler_deg,
-    fix_reasons,
-    heading_at,
-    wrapped,
-)
-from wildlab.flight.readers.log import (
-    ANGLES,
     VELOCITY,
     WORLD,
     Array,
     Clock,
     Decoded,
+    Messages,
     Readings,
+    at_times,
+    device_angles,
+    euler_deg,
+    fix_reasons,
+    heading_at,
     holding,
     named,
+    wrapped,
 )
 
 MAGIC = b"ULog\x01\x12\x35"

@@ -21,30 +21,28 @@ import numpy as np
 from wildlab.errors import WildlabError
 from wildlab.flight.clock_fitting import ClockFit, fit_steady
 from wildlab.flight.files import printable
-from wildlab.flight.readers.autopilot import (
+from wildlab.flight.readers.log import (
+    ANGLES,
     FIELD,
     IMU,
     LAT_LON,
-    Messages,
-    at_times,
-    device_angles,
-    fix_reasons,
-    heading_at,
-    wrapped,
-)
-from wildlab.flight.readers.log import (
-    ANGLES,
     VELOCITY,
     WORLD,
     Array,
     Clock,
     Decoded,
     Mask,
+    Messages,
     Readings,
     any_of,
+    at_times,
+    device_angles,
+    fix_reasons,
+    heading_at,
     holding,
     level_velocity,
     named,
+    wrapped,
 )
 
 #: MAV_AUTOPILOT_INVALID and MAV_TYPE_GCS: what is no autopilot says so in its heartbeat.
