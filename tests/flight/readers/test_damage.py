@@ -38,6 +38,7 @@ AIRDATA = of_airdata.table(of_airdata.rows(120))
         (ubx, b"", "none with a position"),
         (nmea, of_nmea.said("GPHDT,12.0,T"), "1 sentence"),
         (mrk, "hello", "1 line"),
+        (srt, "hello", "0 subtitles"),
         (srt, subtitles("hello", "GPS(n/a, n/a, 0)"), "2 subtitles"),
         (gpx, '<gpx version="1.1"><wpt lat="1" lon="2"/></gpx>', "no point"),
         (gpx, '<gpx version="1.1"><trk><trkseg><trkpt lat="1" lon="2">', "1 are broken"),

@@ -96,6 +96,11 @@ CASES = [
 ]
 
 
+def test_kinds_of_fixes_and_why_some_are_not_used():
+    columns = columns_of(ubx, b"".join(pvt(k, **case) for k, (case, _, _) in enumerate(CASES)))
+    assert list(zip(columns["fix"], columns["why"], strict=True)) == [case[1:] for case in CASES]
+
+
 @pytest.mark.parametrize("left_out", [(), ("NAV-SOL",), ("NAV-TIMEGPS",), ("NAV-VELNED", "NAV-DOP")])
 def test_old_receivers(left_out):
     k = np.arange(8)

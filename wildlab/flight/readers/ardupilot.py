@@ -47,6 +47,7 @@ from wildlab.flight.readers.log import (
     placed,
     usable,
 )
+from wildlab.flight.readers.text import plural
 from wildlab.flight.schema import BOUNDS
 from wildlab.flight.units import week_to_utc
 
@@ -463,7 +464,8 @@ def decode(path: Path, data: bytes, zone: str | None) -> Decoded:
         Where no message of it can be read or tells of motion or images, or PX4 wrote it.
     """
     found = read_records(data)
-    lost = [(found.lost_bytes, "byte", f"of {len(data)} in {found.places} places belong to no message")]
+    where = plural(found.places, "place")
+    lost = [(found.lost_bytes, "byte", f"of {len(data)} in {where} belong to no message")]
     return _decoded(path, found.tables, "message", lost, "")
 
 
