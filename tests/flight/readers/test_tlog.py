@@ -1,4 +1,4 @@
-"""Telemetry logs: values against pymavlink's own decoding, clocks against the truth, damage of all kinds."""
+"""Telemetry logs: values, clocks against the truth, damage of all kinds."""
 
 import time
 from pathlib import Path
@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega
 from tests.flight.readers.mavlink_logs import BOOT_S, START_S, frame, joined, made, telemetry
 from tests.flight.readers.tracks import Reader, check, near
 from wildlab.flight.readers.formats import recognise
-from wildlab.flight.readers.tlog import KINDS, walk
+from wildlab.flight.readers.tlog import walk
 
 tlog = Reader("tlog")
 
@@ -36,31 +36,8 @@ def decoded(data: bytes) -> list[tuple[float, Any]]:
     return found
 
 
-def same_as_pymavlink(data: bytes) -> int:
-    frames, compared = walk(data), 0
-    truth: dict[str, list[tuple[float, Any]]] = {}
-    for received, message in decoded(data):
-        truth.setdefault(message.get_type(), []).append((received, message))
-    for name in KINDS & set(truth):
-        rows, found = truth[name], frames.of(name)
-        assert len(found) == len(rows)
-        assert (found.get("received_s") == [received for received, _ in rows]).all()
-        assert (found.get("system") == [message.get_srcSystem() for _, message in rows]).all()
-        for field in rows[0][1].fieldnames:
-            values = [getattr(message, field) for _, message in rows]
-            if isinstance(values[0], str):
-                assert found.texts(field) == [one.strip() for one in values]
-            else:
-                several = [one for one in found.fields if one.startswith(f"{field}[")]
-                ours = (found.several(*several) if several else found.get(field)).tolist()
-                assert np.array_equal(ours, values, equal_nan=True)
-            compared += len(values)
-    return compared
-
-
 def test_sample(shared_data):
     data = shared_data("logs", "cuav2018_sar", "flight.tlog").read_bytes()
-    assert same_as_pymavlink(data) > 40_000
     assert recognise(data[:8192]) == "tlog"
     log = read(data)
     sizes = {"poses": 604, "gnss": 732, "imu": 771, "magnetometer": 771}

@@ -66,7 +66,7 @@ _HEAD = ("received_s", "system", "component")
 #: Messages of use.
 KINDS = frozenset(
     {
-        *("HEARTBEAT", "STATUSTEXT", "AUTOPILOT_VERSION", "SYSTEM_TIME"),
+        *("HEARTBEAT", "STATUSTEXT", "SYSTEM_TIME"),
         *("ATTITUDE", "GLOBAL_POSITION_INT", "LOCAL_POSITION_NED", "GPS_RAW_INT"),
         *("HIGHRES_IMU", "SCALED_IMU", "SCALED_IMU2", "RAW_IMU"),
         *("CAMERA_FEEDBACK", "CAMERA_TRIGGER", "GIMBAL_DEVICE_ATTITUDE_STATUS", "MOUNT_ORIENTATION"),
@@ -119,15 +119,17 @@ def walk(data: bytes) -> Telemetry:
     library = dialect.MAVLink(None)
     rows: dict[str, list[tuple[Any, ...]]] = {}
     systems: set[int] = set()
-    bad = skipped = places = number = sound = pos = covered = 0
+    bad = skipped = places = number = pos = covered = 0
     while pos + 16 <= len(data):
         end = _end(data, pos)
+        whole = pos < end <= len(data) and _plausible(data, pos)
         message = None
-        if pos < end <= len(data) and _plausible(data, pos):
+        if whole:
             with suppress(dialect.MAVError):
                 message = library.decode(bytearray(data[pos + 8 : end]))
-        known = message is not None and message.get_msgId() in dialect.mavlink_map
-        if not known and not (pos < end <= len(data) and _plausible(data, pos) and _begins(data, end)):
+        # What pymavlink does not know has no checksum.
+        known = message is not None and message.get_msgId() >= 0
+        if not known and not (whole and _begins(data, end)):
             next_ = _BEGINNING.search(data, pos + 1)
             if next_ is None:
                 break
@@ -137,7 +139,6 @@ def walk(data: bytes) -> Telemetry:
         if message is None or not known:
             bad += 1
         else:
-            sound += 1
             name, system = message.get_type(), message.get_srcSystem()
             systems.add(system)
             if name in KINDS:
@@ -151,11 +152,11 @@ def walk(data: bytes) -> Telemetry:
     fields = {one.msgname: one.fieldnames for one in dialect.mavlink_map.values()}
     kinds = {name: _messages(name, fields[name], found) for name, found in rows.items()}
     lost = [
-        (bad, "frame", f"damaged or of kinds that are not known, {sound} are read"),
+        (bad, "frame", f"damaged or of kinds that are not known, {number - bad} are read"),
         (skipped, "byte", f"of {len(data)} in {places} places are no frames"),
         (len(data) - covered, "byte", f"of {len(data)} at the end: it ends within a frame"),
     ]
-    return Telemetry(kinds, systems, sound, lost)
+    return Telemetry(kinds, systems, number - bad, lost)
 
 
 def _messages(name: str, fields: list[str], rows: list[tuple[Any, ...]]) -> Messages:
@@ -380,12 +381,11 @@ def _called(vehicle: Vehicle) -> str:
     beats = vehicle.own("HEARTBEAT")
     if not len(beats):
         return ""
-    kind = names("MAV_TYPE", int(beats.get("type")[0]))
-    said = [names("MAV_AUTOPILOT", int(beats.get("autopilot")[0]))]
-    version = vehicle.own("AUTOPILOT_VERSION")
-    if len(version) and (number := int(version.get("flight_sw_version")[0])):
-        said.append(".".join(str(number >> shift & 255) for shift in (24, 16, 8)))
-    return " ".join(one for one in (*said, kind and f"({kind})") if one)
+    autopilot, kind = (
+        names(enumeration, int(beats.get(field)[0]))
+        for enumeration, field in (("MAV_AUTOPILOT", "autopilot"), ("MAV_TYPE", "type"))
+    )
+    return f"{autopilot} ({kind})"
 
 
 # -- parts
