@@ -60,12 +60,12 @@ class MapPlaces:
         """(N, 3): column and row, counted from the corner of the first cell, and height as in the map."""
         llh = ned_to_geodetic(p_n, self.origin)
         x, y = self.to_map(np.degrees(llh[:, 1]), np.degrees(llh[:, 0]))
-        column, row = self.map.to_cells(x, y)
+        column, row = ~self.map.transform @ (x, y)
         return np.column_stack([column, row, llh[:, 2] - self.added])
 
     def of_cells(self, cells: Array, heights: Array) -> Array:
         """(N, 3) in n of columns and rows (N, 2) with heights as in the map."""
-        x, y = self.map.to_crs(cells[:, 0], cells[:, 1])
+        x, y = self.map.transform @ (cells[:, 0], cells[:, 1])
         longitude, latitude = self.from_map(x, y)
         return geodetic_to_ned(np.radians(latitude), np.radians(longitude), heights + self.added, self.origin)
 

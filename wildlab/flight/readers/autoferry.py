@@ -21,7 +21,7 @@ from pydantic import AfterValidator, BaseModel, Field, RootModel
 from wildlab.errors import WildlabError
 from wildlab.flight.files import check_model
 from wildlab.flight.readers.log import named
-from wildlab.flight.readers.text import Real, parse_json
+from wildlab.flight.readers.text import Real, Several, parse_json
 
 Part = Literal["frames", "lidar", "radar", "ir", "eo", "truth"]
 
@@ -59,7 +59,7 @@ class SeenPoints(SeenBearings):
     ]
 
 
-class Detections(RootModel[list[Annotated[SeenBearings | SeenPoints, Field(discriminator="sensor")]]]):
+class Detections(RootModel[Several[Annotated[SeenBearings | SeenPoints, Field(discriminator="sensor")]]]):
     """A file of detections."""
 
 
@@ -71,7 +71,7 @@ class Target(BaseModel):
     position: tuple[Metres, Metres, Metres]
 
 
-class Truth(RootModel[list[list[Target]]]):
+class Truth(RootModel[Several[Several[Target]]]):
     """A file of truth."""
 
 

@@ -28,6 +28,7 @@ from wildlab.flight.readers.log import Mask
 from wildlab.flight.readers.text import (
     Identity,
     Real,
+    Several,
     numbers,
     parse_json,
     plain,
@@ -281,7 +282,11 @@ def choose_classes(marked: Marked, path: Path, classes: tuple[str, ...] = ()) ->
 
 
 def _read(path: Path, group: str | None, truth: Marked | None) -> Marked:
-    if path.is_dir():
+    try:
+        folder = path.is_dir()
+    except OSError as error:
+        raise unreadable(error, path) from None
+    if folder:
         if group is not None:
             problem = "a folder of YOLO's says nothing of groups"
             raise WildlabError(problem, "leave --group out", file=path, field=group)
@@ -341,12 +346,12 @@ class Result(Annotation):
 class Truth(BaseModel):
     """COCO's truth."""
 
-    images: Annotated[list[Image], Field(min_length=1)]
-    categories: list[Category]
-    annotations: list[Annotation]
+    images: Annotated[Several[Image], Field(min_length=1)]
+    categories: Several[Category]
+    annotations: Several[Annotation]
 
 
-class Results(RootModel[list[Result]]):
+class Results(RootModel[Several[Result]]):
     """COCO's results."""
 
 
@@ -370,7 +375,7 @@ class Batch(BaseModel):
     """MegaDetector's file."""
 
     detection_categories: dict[str, str]
-    images: list[Seen]
+    images: Several[Seen]
 
 
 def read_json_boxes(
@@ -755,17 +760,8 @@ def _line(words: list[str], names: dict[int, str], path: Path, where: str) -> tu
 
 
 def class_names(folder: Path) -> dict[int, str]:
-    """Names of classes from ``classes.txt`` or the ``names`` of ``data.yaml``, whichever lies nearest.
-
-    Parameters
-    ----------
-    folder
-        Of the text files.
-
-    Returns
-    -------
-    dict
-        By the number of the class; empty where no file says it.
+    """Names of classes by their numbers, from ``classes.txt`` or ``data.yaml``, whichever lies nearest to a
+    folder of text files; empty where there is neither.
 
     Raises
     ------

@@ -83,16 +83,6 @@ class ElevationMap:
     offset: float
     nodata: float | None
 
-    def to_crs(self, column: Array, row: Array) -> tuple[Array, Array]:
-        """Coordinates in the CRS of columns and rows, counted from the corner of the first cell."""
-        t = self.transform
-        return t.a * column + t.b * row + t.c, t.d * column + t.e * row + t.f
-
-    def to_cells(self, x: Array, y: Array) -> tuple[Array, Array]:
-        """Columns and rows of coordinates in the CRS."""
-        t = ~self.transform
-        return t.a * x + t.b * y + t.c, t.d * x + t.e * y + t.f
-
     @contextlib.contextmanager
     def opened(self) -> Iterator[Any]:
         """The file, for `read`."""

@@ -12,12 +12,12 @@ from collections.abc import Iterable
 from datetime import UTC, datetime
 from itertools import dropwhile
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, TypeVar
 from xml.etree.ElementTree import Element, ParseError, iterparse
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AllowInfNan, Strict
+from pydantic import AllowInfNan, FailFast, Strict
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import printable
@@ -231,6 +231,9 @@ def read_text_table(data: bytes, path: Path) -> TextTable:
 # -- JSON and XML
 
 
+T = TypeVar("T")
+#: A list that is refused by the first thing that is wrong in it: a hostile one has millions.
+Several = Annotated[list[T], FailFast()]
 #: A finite number, and what names a thing; true is neither.
 Real = Annotated[float, Strict(), AllowInfNan(False)]
 Identity = Annotated[int, Strict()] | Annotated[str, Strict()]

@@ -23,7 +23,15 @@ from pydantic import BaseModel, Field
 from wildlab.errors import WildlabError
 from wildlab.flight.files import check_model, printable, read_regular
 from wildlab.flight.readers.log import Decoded, Readings, holding
-from wildlab.flight.readers.text import Real, header_of, parse_json, parse_xml, plain, read_text_table
+from wildlab.flight.readers.text import (
+    Real,
+    Several,
+    header_of,
+    parse_json,
+    parse_xml,
+    plain,
+    read_text_table,
+)
 from wildlab.geometry.frames import (
     Array,
     Origin,
@@ -101,8 +109,8 @@ def _ring(words: str, path: Path) -> Array:
 WGS84 = re.compile(r"(urn:ogc:def:crs:)?(OGC:(1\.3)?:?CRS84|EPSG:([\d.]*:)?(4326|4979))", re.IGNORECASE)
 #: Properties that name a feature, in this order, without regard to capitals.
 PROPERTIES = ("name", "id", "label", "title", "point", "target", "target_id", "code")
-Position = Annotated[list[Real], Field(min_length=2, max_length=4)]
-Rings = Annotated[list[list[Position]], Field(min_length=1)]
+Position = Annotated[Several[Real], Field(min_length=2, max_length=4)]
+Rings = Annotated[Several[Several[Position]], Field(min_length=1)]
 
 
 class Point(BaseModel):
@@ -116,7 +124,7 @@ class MultiPoint(BaseModel):
     """Places."""
 
     type: Literal["MultiPoint"]
-    coordinates: list[Position]
+    coordinates: Several[Position]
 
 
 class Polygon(BaseModel):
@@ -130,7 +138,7 @@ class MultiPolygon(BaseModel):
     """Polygons."""
 
     type: Literal["MultiPolygon"]
-    coordinates: list[Rings]
+    coordinates: Several[Rings]
 
 
 class Lines(BaseModel):
@@ -143,7 +151,7 @@ class Geometries(BaseModel):
     """Geometries together."""
 
     type: Literal["GeometryCollection"]
-    geometries: list[Geometry]
+    geometries: Several[Geometry]
 
 
 Geometry = Annotated[
@@ -174,7 +182,7 @@ class NamedCrs(BaseModel):
 class Features(BaseModel):
     """A FeatureCollection."""
 
-    features: list[Feature]
+    features: Several[Feature]
     crs: NamedCrs | None = None
 
 
