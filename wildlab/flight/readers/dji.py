@@ -244,7 +244,7 @@ def mrk_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
         "fix": fix,
     }
     return Decoded(
-        {"triggers": Readings(columns, [at for at, _ in found], "line", {"no fix": fix == 0.0})},
+        {"triggers": Readings(columns, [at for at, _ in found], "line")},
         clock=Clock.shifted("GPS weeks", columns["time_log_s"], time),
         lost=[(len(lines) - len(found), "line", f"of {len(lines)} could not be read")],
         notes=["places are those of the camera, not the antenna"],

@@ -51,7 +51,8 @@ PARTS: dict[str, tuple[str, ...]] = {
         *(*ANGLES, "q_w", "q_x", "q_y", "q_z"),
         *("sd_horizontal_m", "sd_vertical_m", "sd_tilt_deg", "sd_heading_deg"),
     ),
-    # Satellite positions, of the first receiver; `fix` as NMEA and MAVLink number kinds: 3 is in space.
+    # Satellite positions, of the first receiver; `fix`: 0 none, 1 estimated, 2 plane, 3 in space, 4
+    # differential, 5 float, 6 fixed.
     "gnss": (*PLACE, *VELOCITY, *_SPREADS, "satellites", "fix", "hdop"),
     # Forward, right, down; at rest and level f is (0, 0, -g).
     "imu": ("f_x_m_s2", "f_y_m_s2", "f_z_m_s2", "w_x_rad_s", "w_y_rad_s", "w_z_rad_s"),
@@ -437,6 +438,9 @@ def judge(part: str, decoded: Readings) -> dict[str, Mask]:
     # Damaged values may be anything: they are marked, not warned of.
     with np.errstate(invalid="ignore", over="ignore"):
         where = "latitude_deg" in have and not decoded.anywhere
+        if where and "fix" in have:
+            add("no fix", have["fix"] == 0)
+            add("estimated, not measured", have["fix"] == 1)
         if where:
             for reason, mask in _misplaced(have["latitude_deg"], have["longitude_deg"]).items():
                 add(reason, mask)

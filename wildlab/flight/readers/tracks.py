@@ -144,9 +144,8 @@ def nmea_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
         "no sentence carries a date (RMC, ZDA): UTC is not known": not timed,
     }
     columns = {"time_s": utc, "time_log_s": place["time"].to_numpy(float), **_columns(found)}
-    unusable = {"no fix": found["no_fix"], "estimated, not measured": place["guessed"].to_numpy(bool)}
     return Decoded(
-        {"gnss": Readings(columns, place["line"], "line", unusable)},
+        {"gnss": Readings(columns, place["line"], "line", {"no fix": found["no_fix"]})},
         clock=Clock("UTC of the log", pairs=timed) if timed else None,
         lost=[(bad, "sentence", "with a wrong or missing checksum")],
         notes=holding(notes),
@@ -195,12 +194,12 @@ def _epochs(table: pd.DataFrame) -> dict[str, Any]:
     table = table.assign(epoch=epoch.ffill()).dropna(subset="epoch")
     places = table[table["kind"].isin(_POSITIONS)]
     kinds = [_fix(*one) for one in zip(places["status"], places["mode"], places["kind"], strict=True)]
-    places = places.assign(fix=[fix for fix, _ in kinds], guessed=[one for _, one in kinds])
+    places = places.assign(fix=kinds)
     better = places["kind"].map(_POSITIONS.index)
     best = places.assign(better=better).sort_values(["epoch", "better"]).drop_duplicates("epoch")
     best = best.set_index("epoch")
     # One sentence without a fix is enough.
-    none = places["epoch"][(places["fix"] == 0) & ~places["guessed"].astype(bool)]
+    none = places["epoch"][places["fix"] == 0]
     others = {
         kind: table[table["kind"] == kind].drop_duplicates("epoch").set_index("epoch").reindex(best.index)
         for kind in ("RMC", "VTG", "GST")
@@ -208,13 +207,13 @@ def _epochs(table: pd.DataFrame) -> dict[str, Any]:
     return {"place": best, "no_fix": np.isin(best.index, none), **others}
 
 
-def _fix(status: str, mode: str, kind: str) -> tuple[float, bool]:
-    """Kind of fix by one sentence, NaN where it does not say; and whether it was estimated or made up."""
+def _fix(status: str, mode: str, kind: str) -> float:
+    """Kind of fix by one sentence, NaN where it does not say."""
     if status == "A" and not mode:
-        return np.nan, False
+        return np.nan
     valid = status == "A" or kind in ("GGA", "GNS")
     best = max((_MODES.get(one, 0.0) for one in mode), default=0.0) if valid else 0.0
-    return best, best == 0.0 and any(one in _GUESSED for one in mode)
+    return 1.0 if best == 0.0 and any(one in _GUESSED for one in mode) else best
 
 
 def _columns(found: Mapping[str, Any]) -> dict[str, Array]:
@@ -419,10 +418,8 @@ def _of_pvt(found: UbxFrames, kind: tuple[int, int]) -> Readings | None:
     one = {name: rows[name].to_numpy() for name in rows}
     columns = {"time_s": _utc(rows), **_place(found, rows), "sd_velocity_m_s": one["s_acc"] * 1e-3}
     kinds, flags = rows["fix"].map(_FIXES).fillna(0.0).to_numpy(), one["flags"].astype(int)
-    estimated = one["fix"] == 1
     reasons: dict[str, Mask] = {
-        "no fix": ((kinds < 2) & ~estimated) | (flags & 1 == 0),
-        "estimated, not measured": estimated,
+        "no fix": flags & 1 == 0,
         "time is not known to the receiver": (one["valid"] & 3) != 3,
     }
     carrier = flags >> 6 if kind == PVT else 0 * flags
@@ -454,10 +451,7 @@ def _of_old(found: UbxFrames) -> Readings | None:
         "fix": kinds,
         "satellites": status["satellites"].to_numpy(float),
     }
-    estimated = (fix == 1).to_numpy()
-    none = ((kinds < 2) & ~estimated) | (flags & 1 == 0).to_numpy()
-    reasons = {"no fix": none, "estimated, not measured": estimated}
-    return Readings(columns, rows["which"], "message", reasons)
+    return Readings(columns, rows["which"], "message", {"no fix": (flags & 1 == 0).to_numpy()})
 
 
 def _weeks_to_utc(found: UbxFrames, own: Array) -> Array:
@@ -491,7 +485,9 @@ def _poses(found: UbxFrames, gnss: Readings) -> Readings | None:
         angle = np.where(spread > 0, turned[name] * 1e-5, np.nan)
         columns["yaw_deg" if name == "heading" else f"{name}_deg"] = angle
     columns |= {"sd_tilt_deg": tilt_from_roll_pitch(*spreads[:2]), "sd_heading_deg": spreads[2]}
-    return place._replace(columns=columns)
+    fix = place.columns["fix"]
+    kinds = {"no fix": place.unusable["no fix"] | (fix == 0), "estimated, not measured": fix == 1}
+    return place._replace(columns=columns, unusable={**place.unusable, **kinds})
 
 
 # -- GPX
@@ -538,7 +534,7 @@ def gpx_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     notes = ["no point carries a time that can be true"]
     return _in_order_of_time(
         Decoded(
-            {"gnss": Readings(columns, None, "point", {"no fix": columns["fix"] == 0.0})},
+            {"gnss": Readings(columns, None, "point")},
             clock=Clock("UTC of the log", pairs=timed) if timed else None,
             lost=[(broken, "point", f"of {len(pieces)} could not be read")],
             notes=[] if timed else notes,
@@ -662,10 +658,9 @@ def pos_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
         "fix": fix,
     }
     base = "GPS time of the rows" if scale == "GPST" else "UTC of the log"
-    reasons = {"no fix": fix == 0.0, "estimated, not measured": fix == 1.0}
     return _in_order_of_time(
         Decoded(
-            {"gnss": Readings(columns, [at for at, _, _ in rows], "line", reasons)},
+            {"gnss": Readings(columns, [at for at, _, _ in rows], "line")},
             clock=Clock.shifted(base, own, columns["time_s"]),
             lost=[(bad, "line", f"of {bad + len(rows)} could not be read")],
         )
