@@ -227,7 +227,7 @@ def mrk_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     found = [(at, match.groups()) for at, line in lines if (match := _ROW.match(line))]
     if not found:
         problem = f"{plural(len(lines), 'line')}, and none is a record of an image"
-        raise WildlabError(problem, "copy the file from the aircraft's card again", file=path)
+        raise WildlabError(problem, "copy it from the card again", file=path)
     values = numbers(text for _, row in found for text in row).reshape(len(found), 10).T
     count, seconds, week, latitude, longitude, height, north, east, up, state = values
     time = np.where(seconds < WEEK_S, week_to_utc(week, seconds), np.nan)

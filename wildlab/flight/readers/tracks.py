@@ -528,7 +528,7 @@ def gpx_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     broken = len(pieces) - int(placed.sum())
     if not placed.any():
         problem = "has no point of a track" + (f"; {broken} are broken" if broken else "")
-        raise WildlabError(problem, "export the recorded track, not a route or waypoints", file=path)
+        raise WildlabError(problem, "export the recorded track", file=path)
     columns = {name: one[placed] for name, one in columns.items()}
     timed = int((columns["time_s"] >= GPS_START_S).sum())
     notes = ["no point carries a time that can be true"]
