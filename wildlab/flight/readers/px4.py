@@ -43,8 +43,8 @@ from wildlab.flight.readers.log import (
 )
 
 MAGIC = b"ULog\x01\x12\x35"
-#: Fields of all topics of a log together (real ones have some 10 000), and bytes that are no messages.
-MOST_FIELDS, MOST_STRANGE = 200_000, 100_000
+#: Fields of all topics of a log together (real ones have some 5000), and bytes that are no messages.
+MOST_FIELDS, MOST_STRANGE = 50_000, 100_000
 
 TOPICS = [
     "vehicle_attitude",
@@ -188,9 +188,10 @@ class Px4Log(NamedTuple):
     topics: dict[str, Messages]
     fit: ClockFit | None
 
-    def first(self, *names: str) -> Messages | None:
-        """The first of these topics that there is."""
-        return next((self.topics[name] for name in names if name in self.topics), None)
+    def first(self, *names: str) -> Messages:
+        """The first of these topics that there is, else one without messages."""
+        nothing = Messages(names[0], {}, np.zeros(0, np.int64))
+        return next((self.topics[name] for name in names if name in self.topics), nothing)
 
     def readings(self, found: Messages, columns: dict[str, Array], **more: object) -> Readings:
         """Columns of a topic with ``time_s`` (UTC, NaN where that is not known) and ``time_log_s``."""
@@ -226,15 +227,13 @@ def _parts(log: Px4Log) -> tuple[dict[str, Readings], list[str]]:
 def _poses(log: Px4Log, notes: list[str]) -> Readings | None:
     attitude = log.first("vehicle_attitude")
     place, local = log.first("vehicle_global_position"), log.first("vehicle_local_position")
-    if attitude is None or not attitude.has("q[0]"):
-        if place is not None:
+    if not attitude.has("q[0]"):
+        if len(place):
             notes.append(f"{len(place)} positions without attitudes make no poses")
         return None
     at = taken_s(attitude)
-    if place is not None and (place.has("lat") or place.has("latitude_deg")):
-        columns = _at(place, _from_global(place), at)
-        if local is not None:
-            columns = _at(local, _local_motion(local), at) | columns
+    if place.has("lat") or place.has("latitude_deg"):
+        columns = _at(local, _local_motion(local), at) | _at(place, _from_global(place), at)
     else:
         columns = dict.fromkeys(("latitude_deg", "longitude_deg"), np.full(len(at), np.nan))
         notes.append(f"{len(attitude)} attitudes stand without any position on Earth")
@@ -292,10 +291,8 @@ def _local_motion(local: Messages) -> dict[str, Array]:
     }
 
 
-def _gnss(log: Px4Log) -> Readings | None:
+def _gnss(log: Px4Log) -> Readings:
     found = log.first("vehicle_gps_position", "sensor_gps")
-    if found is None or not (found.has("lat") or found.has("latitude_deg")):
-        return None
     velocity = found.columns(named(VELOCITY, ("vel_n_m_s", "vel_e_m_s", "vel_d_m_s")))
     moving = found.get("vel_ned_valid") != 0
     columns = _position(found) | found.columns(SPREADS | QUALITY)
@@ -303,42 +300,35 @@ def _gnss(log: Px4Log) -> Readings | None:
     return log.readings(found, columns, unusable=fix_reasons(columns["fix"]))
 
 
-def _imu(log: Px4Log) -> Readings | None:
+def _imu(log: Px4Log) -> Readings:
     found = log.first("sensor_combined")
-    if found is None:
-        return None
     names = [f"{name}[{i}]" for name in ("accelerometer_m_s2", "gyro_rad") for i in range(3)]
-    columns = found.columns(named(IMU, names))
-    return None if np.isnan(list(columns.values())).all() else log.readings(found, columns)
+    return log.readings(found, found.columns(named(IMU, names)))
 
 
 def _magnetometer(log: Px4Log) -> Readings | None:
     for name in ("vehicle_magnetometer", "sensor_mag", "sensor_combined"):
         found = log.first(name)
-        if found is None:
-            continue
         fields = "xyz" if name == "sensor_mag" else [f"magnetometer_ga[{i}]" for i in range(3)]
-        columns = {ours: found.get(one) * _GAUSS_UT for ours, one in zip(FIELD, fields, strict=True)}
-        if not np.isnan(list(columns.values())).all():
+        if found.has(*fields):
+            columns = {ours: found.get(one) * _GAUSS_UT for ours, one in zip(FIELD, fields, strict=True)}
             return log.readings(found, columns)
     return None
 
 
-def _triggers(log: Px4Log) -> Readings | None:
+def _triggers(log: Px4Log) -> Readings:
     found = log.first("camera_capture", "camera_trigger")
-    if found is None:
-        return None
     fields = LAT_LON | {"height_sea_m": "alt"} if found.has("lat") else {}
     return log.readings(found, found.columns({"number": "seq", **fields}), anywhere=True)
 
 
 def _gimbal(log: Px4Log, poses: Readings | None) -> Readings | None:
     device, mount = log.first("gimbal_device_attitude_status"), log.first("mount_orientation")
-    if device is not None and device.has("q[0]"):
+    if device.has("q[0]"):
         heading = heading_at(poses, taken_s(device), "time_log_s")
         flags = np.nan_to_num(device.get("device_flags"))
         return log.readings(device, device_angles(device.quaternion(), flags, heading))
-    if mount is None:
+    if not len(mount):
         return None
     roll, pitch, yaw = np.degrees(mount.several(*(f"attitude_euler_angle[{i}]" for i in range(3)))).T
     world = wrapped(yaw + heading_at(poses, taken_s(mount), "time_log_s"))
