@@ -152,7 +152,7 @@ def test_filling_at_the_end_is_no_loss_and_a_cut_message_is():
 def test_other_logs_with_the_same_heads_are_refused():
     log = Log("PARM Nf Name,Value")
     log.add("PARM", "SYSID", 1)
-    with pytest.raises(WildlabError, match="no message of attitude"):
+    with pytest.raises(WildlabError, match="holds no attitude"):
         dataflash.read(Path("flight.bin"), log.binary())
     log = Log("ATT fffffff qw,qx,qy,qz,Roll,Pitch,Yaw")
     log.add("ATT", 1, 0, 0, 0, 0, 0, 0)
