@@ -101,15 +101,9 @@ CHARTS: dict[str, Draw] = {
         TIMES, {name: walk(rng, 181, 3) for name in ("mekf", "observer")},
         {"mekf": rng.gamma(2, 1, (181, 3))}, ["roll (°)", "pitch (°)", "yaw (°)"], LONG,
     ),
-    "deviations": lambda rng: navigation.deviation_chart(
-        TIMES, rng.gamma(2, 1, (181, 6)), list(rng.gamma(2, 1, 6)), ("m", "°"), LONG
-    ),
     "biases": lambda rng: navigation.bias_chart(TIMES, walk(rng, 181, 6), rng.gamma(2, 1, (181, 6)), LONG),
     "nis": lambda rng: navigation.squares_chart(
         {name: (TIMES, rng.chisquare(3, 181)) for name in ("position", "velocity")}, 3, "NIS", LONG
-    ),
-    "white": lambda rng: navigation.correlation_strips(
-        {"velocity": rng.uniform(-0.2, 0.2, (3, 11))}, {"velocity": 0.1}, LONG
     ),
     "flights": lambda rng: drawing.dots_chart(
         ["a", "a flight with quite a long name", "c"], rng.gamma(2, 1, 3), *np.full((2, 3), np.nan), "m",

@@ -17,7 +17,6 @@ from wildlab.analysis.navigate import (
     Studied,
     against_autopilot,
     calibrated,
-    normalised_innovations,
     numbers_of,
     study_navigation,
     summarise,
@@ -25,7 +24,6 @@ from wildlab.analysis.navigate import (
 )
 from wildlab.analysis.navigation_inputs import Placement, Receiver, heading_from, place_receiver
 from wildlab.analysis.verdict import VERDICT_LEVEL, Evidence, Verdict, verdict_of
-from wildlab.evaluation.consistency import innovation_whiteness
 from wildlab.evaluation.intervals import block_mean, time_blocks
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import Flight
@@ -36,8 +34,6 @@ from wildlab.navigation.receiver import SIZE
 from wildlab.reporting.charts.georeferencing import aircraft_map
 from wildlab.reporting.charts.navigation import (
     bias_chart,
-    correlation_strips,
-    deviation_chart,
     error_bands,
     mark_period,
     poses_between,
@@ -65,8 +61,6 @@ def trial(seed: int, *, twin: str) -> dict[tuple[str, str], float]:
 Period = tuple[float, float]
 #: The map of a flight by the first of its other figures; that of 7.13 on is another case's figure 7.2.
 MAPS = {23: 22, 33: 32}
-#: Lags of the autocorrelation of innovations.
-LAGS = 40
 _TURNS = [f"{axis} (°)" for axis in AXES]
 _SPEEDS = [f"{place} (m/s)" for place in PLACES]
 
@@ -179,31 +173,20 @@ def autopilot_figures(studied: Studied, tuned: str, begin: float, figures: int) 
     ]
 
 
-def state_figures(studied: Studied, published: Sequence[float] | None) -> list[Shown]:
-    """Deviations and biases that the filter estimates; ``published`` are six means, m and degrees."""
-    sd = studied.scored["mekf"].sd
-    both = np.hstack([sd[:, :3], np.degrees(sd[:, 6:])])
+def bias_figure(studied: Studied) -> Shown:
+    """Biases that the filter estimates, with their deviations."""
     biases = studied.found["mekf"].biases
     columns = [str(name) for name in biases if not str(name).startswith("sd_") and name != "time_s"]
     spread = biases[[f"sd_{name}" for name in columns]]
-    return [
-        Shown(deviation_chart(studied.times, both, published, ("m", "°"), ""), "deviations"),
-        Shown(bias_chart(biases["time_s"], biases[columns], spread, ""), "biases"),
-    ]
+    return Shown(bias_chart(biases["time_s"], biases[columns], spread, ""), "biases")
 
 
-def innovation_figures(studied: Studied, window: Period) -> list[Shown]:
-    """NIS and autocorrelation of the filter's innovations, by source."""
+def nis_figure(studied: Studied, window: Period) -> Shown:
+    """NIS of the filter's innovations, by source."""
     raw = studied.found["mekf"].innovations
     raw = raw[raw["time_s"].between(*window)]
-    split = {str(name): part for name, part in raw.groupby("source", sort=False)}
-    white = {name: innovation_whiteness(normalised_innovations(part), LAGS) for name, part in split.items()}
-    nis = {name: (part["time_s"], part["nis"]) for name, part in split.items()}
-    rows, bounds = ({k: getattr(w, of) for k, w in white.items()} for of in ("autocorrelation", "bound"))
-    return [
-        Shown(squares_chart(nis, 3, "NIS", ""), "nis"),
-        Shown(correlation_strips(rows, bounds, ""), "autocorrelation"),
-    ]
+    nis = {str(name): (part["time_s"], part["nis"]) for name, part in raw.groupby("source", sort=False)}
+    return Shown(squares_chart(nis, 3, "NIS", ""), "nis")
 
 
 def nees_figure(studied: Studied, begin: float) -> Shown:
@@ -213,18 +196,15 @@ def nees_figure(studied: Studied, begin: float) -> Shown:
     return Shown(squares_chart(nees, 3, "NEES", ""), "nees")
 
 
-def simulated_figures(
-    studied: Studied, window: Period, tuned: str, figures: int, published: Mapping[tuple[str, str], float]
-) -> list[Shown]:
+def simulated_figures(studied: Studied, window: Period, tuned: str, figures: int) -> list[Shown]:
     """All figures of a simulated flight, errors of attitude first; parameters as of the functions above."""
-    means = [published["mekf", f"mean_sd_{name}"] for name in (*PLACES, *AXES)]
     return [
         *error_figures(studied, window),
         *path_figures(studied, window, figures),
         *flight_figures(studied, window, figures),
         *autopilot_figures(studied, tuned, window[0], figures),
-        *state_figures(studied, means),
-        *innovation_figures(studied, window),
+        bias_figure(studied),
+        nis_figure(studied, window),
         nees_figure(studied, window[0]),
     ]
 
@@ -234,8 +214,8 @@ def logged_figures(studied: Studied, window: Period) -> list[Shown]:
     return [
         *error_figures(studied, window),
         *flight_figures(studied, window, None),
-        *state_figures(studied, None),
-        *innovation_figures(studied, window),
+        bias_figure(studied),
+        nis_figure(studied, window),
     ]
 
 

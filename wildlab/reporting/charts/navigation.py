@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import ArrayLike
 
 from wildlab.evaluation.consistency import chi_square_interval
@@ -18,7 +17,6 @@ from wildlab.reporting.charts.drawing import (
     Array,
     draw_band,
     draw_line,
-    draw_white_band,
     finish,
     new_strips,
     without_jumps,
@@ -123,38 +121,6 @@ def error_bands(
     return finish(fig, title, "time (s)")
 
 
-def deviation_chart(
-    times: ArrayLike, sd: ArrayLike, printed: Sequence[float] | None, units: Sequence[str], title: str
-) -> Figure:
-    """Standard deviations that a filter states over time: position above, attitude below, with log axes.
-
-    Parameters
-    ----------
-    sd
-        (K, 6): north, east, down, roll, pitch, yaw, in the units given (one for each strip).
-    printed
-        Six published means, drawn as broken lines; None where there are none.
-    """
-    fig, axes = new_strips(2, 4.4)
-    values, names = np.asarray(sd, float), (("north", "east", "down"), ("roll", "pitch", "yaw"))
-    for strip, (ax, unit) in enumerate(zip(axes, units, strict=True)):
-        for i, (name, color) in enumerate(zip(names[strip], LINES, strict=False), start=3 * strip):
-            draw_line(ax, times, values[:, i], color, name)
-            if printed is not None:
-                ax.axhline(printed[i], color=color, alpha=0.8, **DASHED)
-        ax.set_yscale("log")
-        low, high = ax.get_ylim()
-        # Over more than a decade and a half, labels in between would lie on one another.
-        ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 30 * low else (1.0,)))
-        ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        ax.yaxis.set_minor_formatter(NullFormatter())
-        ax.set_ylabel(f"SD ({unit})")
-        ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, fontsize=10)
-    axes[0].set_title(title, pad=26)
-    axes[-1].set_xlabel("time (s)")
-    return fig
-
-
 def bias_chart(times: ArrayLike, biases: ArrayLike, sd: ArrayLike, title: str) -> Figure:
     """Biases (K, 6) that a filter estimates, accelerometers (mm/s^2) and gyros (deg/h), within two
     standard deviations."""
@@ -199,20 +165,6 @@ def speed_chart(sources: Mapping[str, tuple[ArrayLike, ArrayLike]], title: str) 
         draw_line(ax, times, speed, colour(name), _named(name), width=1.0)
     ax.set_ylim(0, None)
     return finish(fig, title, "time (s)", "speed over ground (m/s)")
-
-
-def correlation_strips(series: Mapping[str, ArrayLike], bounds: Mapping[str, float], title: str) -> Figure:
-    """Autocorrelations (elements, lags + 1) of innovations, a strip for each source, with the white band."""
-    fig, axes = new_strips(len(series), 1.5 * len(series) + 0.4)
-    for ax, (name, rows) in zip(axes, series.items(), strict=True):
-        draw_white_band(ax, bounds[name])
-        r = np.asarray(rows, float)[:, 1:]
-        for row, color, axis in zip(r, LINES, ("north", "east", "down"), strict=False):
-            draw_line(ax, 1 + np.arange(len(row)), row, color, axis)
-        top = max(0.2, 1.1 * float(np.nanmax(np.abs(r))))
-        ax.set_ylim(-top, top)
-        ax.set_ylabel(_short(name))
-    return finish(fig, title, "lag (measurements)")
 
 
 def velocities_of(nav: pd.DataFrame) -> tuple[Array, Array]:
