@@ -8,21 +8,16 @@ import pytest
 from wildlab.reporting.published import load_published, published_rows
 from wildlab.runner.catalogue import load_studies
 from wildlab.simulation.parameters import each_parameter, fitted_to, load_twin, twin_names
-from wildlab.studies.fit_and_prediction import Beside, tables_apart
-
-
-def numbers(*rows: tuple[str, str]) -> pd.DataFrame:
-    return pd.DataFrame(list(rows), columns=["source", "fitted"])
+from wildlab.studies.page import fit_words
 
 
 def test_tables_are_parted_once_each_in_their_order():
-    rows = numbers(("H table 5.5", ""), ("H table 5.4", "a"), ("H table 5.5", "b"), ("F table 1.1", ""))
-    assert tables_apart(rows) == [
-        Beside("H table 5.5", 1, 2, ("b",)),
-        Beside("H table 5.4", 1, 1, ("a",)),
-        Beside("F table 1.1", 0, 1, ()),
-    ]
-    assert tables_apart(numbers()) == []
+    rows = [("H table 5.5", ""), ("H table 5.4", "a"), ("H table 5.5", "b"), ("F table 1.1", "")]
+    told = fit_words(pd.DataFrame(rows, columns=["source", "fitted"]), load_twin("slow-vessel"))
+    assert told.endswith(
+        "1 of 2 numbers beside H table 5.5 are no test: b. "
+        "What stands beside H table 5.4 is no test: a. What stands beside F table 1.1 is a prediction."
+    )
 
 
 @pytest.mark.parametrize("name", [name for name in twin_names() if load_twin(name).camera_sway])
@@ -40,7 +35,7 @@ def test_the_names_of_tables_are_those_of_the_published_numbers():
         for source in load_published(study)["source"]
     }
     assert set(fitted_to("slow-vessel")) <= typed
-    assert [one.used for one in tables_apart(load_published("slow-vessel"))] == [0, 0]
+    assert "no test" not in fit_words(load_published("slow-vessel"), load_twin("slow-vessel"))
 
 
 def test_numbers_of_tables_that_a_twin_was_fitted_to_are_not_judged():

@@ -87,8 +87,8 @@ def test_a_track_is_the_mean_of_what_was_seen_and_spreads_as_a_walk_does(ship):
     assert first.places[-1, :2] == pytest.approx([4 / 2, -2 / 2])
     # Two sightings at once are worth twice one; then the walk alone.
     spread = first.covariance[:, 0, 0]
-    assert spread[1] == pytest.approx(9.0 / 2)
-    assert np.diff(spread[1:]) == pytest.approx(WALK * np.diff(first.times[1:]))
+    assert spread[0] == pytest.approx(9.0 / 2)
+    assert np.diff(spread) == pytest.approx(WALK * np.diff(first.times))
     assert second.covariance[-1, 1, 1] == pytest.approx(9.0 + WALK * (second.times[-1] - 12.0))
     assert np.isnan(first.nees).all()
 

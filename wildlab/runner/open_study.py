@@ -35,9 +35,8 @@ from wildlab.runner.seeds import (
     read_seed,
     set_aside,
 )
-from wildlab.studies.fit_and_prediction import show_twins
 from wildlab.studies.monte_carlo import record_spread
-from wildlab.studies.page import Shown, show_page
+from wildlab.studies.page import Shown, show_page, show_twins
 from wildlab.studies.protocol import Study, find_case, split_keys
 
 

@@ -28,8 +28,17 @@ from wildlab.evaluation.shares import (
 )
 from wildlab.messages.catalogue import PageTexts, TileText
 from wildlab.messages.quantities import FORMS, number, unit_words
-from wildlab.reporting.published import load_claims
+from wildlab.names import listed
+from wildlab.reporting.published import load_claims, load_published
 from wildlab.reporting.report import Report, Wording
+from wildlab.simulation.parameters import (
+    TwinParameters,
+    each_parameter,
+    fitted_to,
+    load_twin,
+    parameters_table,
+    status_words,
+)
 from wildlab.studies.monte_carlo import CLAIM_COLUMNS, CLAIMS_EXPLAINED, decide_claims
 
 #: Of so many flights each, ranges that lie apart are no chance: a rank test's two-sided probability is 3 %.
@@ -256,3 +265,53 @@ def _premises(report: Report, decided: pd.DataFrame) -> None:
     if (decided["premise"].astype(bool) | decided["threshold"].astype(bool)).any():
         columns = {name: CLAIM_COLUMNS[name] for name in ("claim", "premise", "threshold")}
         report.table(decided, columns=columns, fold="Premises and thresholds of the claims")
+
+
+def show_twins(report: Report, twins: Sequence[str], study: str) -> None:
+    """The section of a report on what was simulated: every parameter of each twin, folded away.
+
+    Parameters
+    ----------
+    twins
+        Their names.
+    study
+        Whose published tables stand beside them.
+    """
+    report.section("What was simulated")
+    for twin in twins:
+        table = parameters_table(twin)
+        report.table(
+            table,
+            fold=f"The twin {twin}: {status_words(table)}",
+            caption=f"Every parameter of the twin. {fit_words(load_published(study), load_twin(twin))}",
+        )
+
+
+def fit_words(published: pd.DataFrame, twin: TwinParameters) -> str:
+    """What of a twin was fitted to which published tables, and what beside it is no test or a prediction.
+
+    Parameters
+    ----------
+    published
+        Columns ``source`` and ``fitted``, as `wildlab.reporting.published.load_published` gives them.
+    """
+    parts = ["No parameter of this twin was fitted to a published table."]
+    if tables := fitted_to(twin):
+        groups = dict.fromkeys(group for group, _, p in each_parameter(twin) if p.fitted_to)
+        what = listed([group.replace("_", " ") for group in groups])
+        parts = [
+            f"Of this twin's parameters {what} were fitted to {listed(tables)} (sizes were chosen by how "
+            "near they bring these tables; what causes such errors is not known)."
+        ]
+    predicted = []
+    for source, reasons in published.groupby("source", sort=False)["fitted"]:
+        used = [reason for reason in reasons if reason]
+        if not used:
+            predicted.append(str(source))
+            continue
+        what = "What stands" if len(used) == len(reasons) else f"{len(used)} of {len(reasons)} numbers"
+        verb = "is" if len(used) == len(reasons) else "are"
+        parts.append(f"{what} beside {source} {verb} no test: {'; '.join(dict.fromkeys(used))}.")
+    if predicted:
+        parts.append(f"What stands beside {listed(predicted)} is a prediction.")
+    return " ".join(parts)

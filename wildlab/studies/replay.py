@@ -212,17 +212,11 @@ def track_targets(flight: Flight, points: Points, begin: float, end: float) -> t
         if not name:
             continue
         rows = np.flatnonzero(usable & (points.names == name))
-        first = points.times[rows[0]]
-        ticks = np.arange(first + EVERY_S, end, EVERY_S)
-        times = np.concatenate([points.times[rows], ticks])
-        z = np.concatenate([points.places[rows, :2], np.full((len(ticks), 2), np.nan)])
-        R = np.concatenate([points.covariance[rows], np.tile(np.eye(2), (len(ticks), 1, 1))])
-        order = np.argsort(times, kind="stable")
-        times, z, R = times[order], z[order], R[order]
-        start = Start(float(times[0]), z[0].copy(), R[0].copy())
-        z[0] = np.nan  # it is where the track starts, and counts once
-        track = run_filter(times, z, R, positions(), random_walk, start)
-        down = np.interp(times, points.times[rows], points.places[rows, 2])
+        seen, z, R = points.times[rows], points.places[rows, :2], points.covariance[rows]
+        times = np.union1d(seen, np.arange(seen[0] + EVERY_S, end, EVERY_S))
+        start = Start(float(seen[0]), z[0], R[0], row=0)
+        track = run_filter(seen, z, R, positions(), random_walk, start, output_times=times)
+        down = np.interp(times, seen, points.places[rows, 2])
         error = np.full((len(times), 2), np.nan)
         if name in truth:
             offset = flight.manifest.clocks.truth_offset_s
