@@ -234,9 +234,9 @@ def trial_gives_what_is_asked(entry: StudyEntry, folder: Path) -> None:
     assert case is not None
     keys = split_keys(numbers)
     assert any(case.rules.unit_of(name) for _, name in keys)
-    spread = pd.DataFrame([keys] * 3)
+    spread = pd.DataFrame([{(TUNED.get(who, who), name): one for (who, name), one in keys.items()}] * 3)
     thresholds = {claim["id"]: claim.get("threshold") for claim in load_claims(entry.name)}
-    checks = checks_of(str(entry.case), spread.rename(columns=TUNED, level=0), TOLD.get(str(entry.case)))
+    checks = checks_of(str(entry.case), spread, TOLD.get(str(entry.case)))
     assert {claim["id"] for claim in load_claims(entry.name) if "needs" not in claim} <= set(checks)
     for claim, check in checks.items():
         threshold = thresholds.get(claim, 1.0 if check.measured is not None else None)
