@@ -111,16 +111,6 @@ def test_a_narrow_range_is_not_stretched_to_black_and_white():
     assert 3 < fixed[45:].std() < 9  # 0.1 K at 255 levels over 4 K
 
 
-def test_a_gradient_of_counts_is_that_of_their_kelvin():
-    """A step of s counts has a Prewitt gradient of 3 s where nothing smooths it."""
-    thresholds = FloatingThresholds(scaling="counts", smoothing_size=1, smoothing_sd=0.01)
-    image = sea()
-    image[:, 60:] += 4.0  # 100 counts
-    assert find_edges(image, None, thresholds).gradient.max() == 300
-    counts = np.round((image - 273.15) * 25 + 100).astype(np.uint16)
-    assert find_edges(counts, None, thresholds).gradient.max() == 300
-
-
 def test_whether_the_contour_or_the_filled_blob_is_small():
     """A ring of steep pixels is counted before it is filled, H 4.3, or after."""
     image = sea()
@@ -190,12 +180,3 @@ def test_pixels_that_show_nothing_have_no_edges():
     assert np.allclose(found.uv[0], [74.5, 49.5], atol=0.1)
     assert np.allclose(detect_floating(image).uv, found.uv)
     assert len(detect_floating(image, np.zeros_like(valid))) == 0
-
-
-def test_areas_go_with_the_height():
-    """H 4.4.1: a contour goes with the scale, a filled area with its square."""
-    ring_, filled = FloatingThresholds(), FloatingThresholds(area_of="filled", largest_area=800)
-    assert ring_.at_height(200, 100).smallest_area == 25
-    assert filled.at_height(200, 100).smallest_area == 12.5
-    assert filled.at_height(50, 100).largest_area == 3200
-    assert ring_.at_height(50, 100).largest_area is None

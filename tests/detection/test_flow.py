@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
+from wildlab.detection import flow
 from wildlab.detection.flow import (
     agreeing,
     find_features,
@@ -85,25 +86,28 @@ def test_something_else_that_moves_otherwise_is_left_out():
     assert 0.1 < found.sd < 0.35
 
 
-def test_what_turns_or_grows_too_much_is_chance():
+def test_what_turns_or_grows_too_much_is_chance(monkeypatch):
     here = np.random.default_rng(9).uniform(0, 60, (12, 2))
     turn = np.array([[np.cos(0.3), -np.sin(0.3)], [np.sin(0.3), np.cos(0.3)]])
     assert len(agreeing(here, here @ turn.T)) == 0
     assert len(agreeing(here, 1.3 * here)) == 0
-    assert len(agreeing(here, here @ turn.T, largest_turn=0.4)) == 12
+    monkeypatch.setattr(flow, "LARGEST_TURN", 0.4)
+    assert len(agreeing(here, here @ turn.T)) == 12
 
 
-def test_the_scatter_of_few_features_is_that_of_what_moved_them():
+def test_the_scatter_of_few_features_is_that_of_what_moved_them(monkeypatch):
     """A motion of four numbers takes four of the differences: of five features six are left."""
     rng, variances = np.random.default_rng(11), []
+    monkeypatch.setattr(flow, "SMALLEST_SD", 1e-6)
     for _ in range(400):
         here = rng.uniform(0, 60, (5, 2))
         there = here + [3.0, -2.0] + 0.2 * rng.standard_normal((5, 2))
-        found = agreeing(here, there, smallest_sd=1e-6)
+        found = agreeing(here, there)
         assert len(found) == 5
         variances.append(found.sd**2)
     assert np.mean(variances) == pytest.approx(0.2**2, rel=0.15)
-    exact = agreeing(here, here + np.array([3.0, -2.0]), smallest_sd=0.07)
+    monkeypatch.setattr(flow, "SMALLEST_SD", 0.07)
+    exact = agreeing(here, here + np.array([3.0, -2.0]))
     assert exact.sd == 0.07, "features that fit exactly are not known exactly"
 
 

@@ -21,7 +21,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.detection.detections import Detections
-from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array, Mask
 
 #: Share of its ellipse that a blob fills below which it is not a filled one.
@@ -287,14 +286,8 @@ def adjust_at_border(
     Detections
         With moved centres, and their covariances without what the hidden part added.
 
-    Raises
-    ------
-    WildlabError
-        Where a length is not above zero.
     """
     lengths = np.broadcast_to(np.asarray(length, float), len(detections))
-    if (lengths <= 0).any():
-        raise WildlabError(f"a length of {lengths.min()} px", "give one above zero", field="length")
     given = CentreErrors()
     moves = border_moves(detections, shape, lengths)
     uv, covariance = detections.uv.copy(), detections.covariance.copy()

@@ -328,16 +328,13 @@ def fill_invalid(image: NDArray[Any], valid: Mask) -> Image:
     Raises
     ------
     WildlabError
-        Where no pixel is valid, or the shapes are not alike.
+        Where no pixel is valid.
 
     Examples
     --------
     >>> fill_invalid(np.array([[5.0, 0.0]]), np.array([[True, False]])).tolist()
     [[5.0, 5.0]]
     """
-    if image.ndim != 2 or image.shape != valid.shape:
-        shapes = f"an image of shape {image.shape} and a mask of shape {valid.shape}"
-        raise WildlabError(f"{shapes}", "give both as (H, W); make grey of a colour image first")
     if not valid.any():
         raise WildlabError("no pixel of the image is valid", "leave such frames out")
     plain = image.astype(np.float32)

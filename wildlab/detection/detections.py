@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
@@ -198,7 +199,7 @@ def describe(
         np.concatenate([low - 0.5, extent], axis=1),
         axes,
         orientation,
-        _hu(starts, apart, area),
+        np.stack([_hu(labels, k + 1, *low[k], *high[k]) for k in range(count)]),
         peak if score is None else np.asarray(score, float),
     )
 
@@ -225,29 +226,11 @@ def _beside(valid: Mask, rows: Indices, columns: Indices) -> Mask:
     return found
 
 
-def _hu(starts: Indices, apart: Array, area: Array) -> Array:
-    """Hu's moments (N, 7), from central moments normalised by the area."""
-    x, y = apart.T
-
-    def eta(p: int, q: int) -> Array:
-        return np.asarray(np.add.reduceat(x**p * y**q, starts) / area ** (1 + (p + q) / 2))
-
-    n20, n02, n11 = eta(2, 0), eta(0, 2), eta(1, 1)
-    n30, n21, n12, n03 = eta(3, 0), eta(2, 1), eta(1, 2), eta(0, 3)
-    a, b = n30 + n12, n21 + n03
-    c, d = n30 - 3 * n12, 3 * n21 - n03
-    return np.stack(
-        [
-            n20 + n02,
-            (n20 - n02) ** 2 + 4 * n11**2,
-            c**2 + d**2,
-            a**2 + b**2,
-            c * a * (a**2 - 3 * b**2) + d * b * (3 * a**2 - b**2),
-            (n20 - n02) * (a**2 - b**2) + 4 * n11 * a * b,
-            d * a * (a**2 - 3 * b**2) - c * b * (3 * a**2 - b**2),
-        ],
-        axis=1,
-    )
+def _hu(labels: NDArray[np.int32], number: int, left: float, top: float, right: float, below: float) -> Array:
+    """Hu's moments (7,) of one region within its box."""
+    here = labels[int(top) : int(below) + 1, int(left) : int(right) + 1]
+    found = cv2.moments((here == number).astype(np.uint8), binaryImage=True)
+    return np.asarray(cv2.HuMoments(found), float).ravel()
 
 
 def join(parts: Sequence[Detections]) -> Detections:

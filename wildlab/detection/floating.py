@@ -11,7 +11,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 import cv2
@@ -32,8 +32,6 @@ from wildlab.geometry.frames import Mask
 
 #: Of how many pixels along each side one is looked at to find an image's range.
 SPARSE = 8
-#: Count of 14 bits for 0 deg C, where kelvin are taken to counts; a gradient does not depend on it.
-COUNTS_AT_ZERO = 7000.0
 _PREWITT = np.array([-1.0, 0.0, 1.0]), np.ones(3)
 _AROUND = np.ones((3, 3), np.uint8)
 
@@ -44,7 +42,7 @@ class Steps(NamedTuple):
     Attributes
     ----------
     grey
-        0 to 255; counts, where the scaling is that.
+        0 to 255.
     smoothed
         Step 1.
     gradient
@@ -157,7 +155,7 @@ def _within(outline: Any) -> _Region:
 
 
 def to_grey(image: NDArray[Any], valid: Mask | None, thresholds: FloatingThresholds) -> NDArray[Any]:
-    """An image in 256 grey levels, or in counts, (H, W); see ``scaling`` of `FloatingThresholds`.
+    """An image in 256 grey levels, (H, W); see ``scaling`` of `FloatingThresholds`.
 
     Parameters
     ----------
@@ -170,15 +168,12 @@ def to_grey(image: NDArray[Any], valid: Mask | None, thresholds: FloatingThresho
 
     Returns
     -------
-    (H, W) uint8; uint16 counts where the scaling is that.
+    (H, W) uint8.
     """
     if image.dtype == np.uint8:
         return np.ascontiguousarray(image)
     unit = thresholds.counts_per_kelvin if image.dtype.kind in "ui" else 1.0
     plain = image if image.dtype in (np.uint16, np.float32, np.float64) else image.astype(np.float32)
-    if thresholds.scaling == "counts":
-        counts = plain if unit != 1.0 else (plain - 273.15) * thresholds.counts_per_kelvin + COUNTS_AT_ZERO
-        return np.asarray(np.clip(np.rint(np.nan_to_num(counts)), 0, 2**14 - 1), np.uint16)
     sparse = image[::SPARSE, ::SPARSE]
     seen = sparse.ravel() if valid is None else sparse[valid[::SPARSE, ::SPARSE]]
     if seen.dtype.kind == "f":
@@ -216,12 +211,6 @@ def find_edges(image: NDArray[Any], valid: Mask | None, thresholds: FloatingThre
             "give a grey image: rows by columns of grey levels, counts or kelvin",
             field="image",
         )
-    if valid is not None and valid.shape != image.shape:
-        raise WildlabError(
-            f"a mask of the shape {valid.shape} for an image of the shape {image.shape}",
-            "give one value for each pixel",
-            field="valid",
-        )
     if image.dtype.kind == "f" and not (finite := np.isfinite(image)).all():
         valid = finite if valid is None else valid & finite
     grey = to_grey(image, valid, thresholds)
@@ -237,8 +226,6 @@ def find_edges(image: NDArray[Any], valid: Mask | None, thresholds: FloatingThre
         reach = size + 2  # what the two kernels see of a pixel that shows nothing
         shows = cv2.erode(valid.astype(np.uint8), np.ones((reach, reach), np.uint8), borderValue=1)
         gradient = gradient * np.asarray(shows)
-    if thresholds.clipping == "normalised" and (largest := float(gradient.max())) > 0:
-        gradient = gradient * np.float32(255.0 / largest)
     # The gradient image has 8 bits: rounded, and whatever lies above 255 is at or above any threshold.
     limit: Any = thresholds.gradient - 0.5
     steep = cv2.compare(gradient, limit, cv2.CMP_GE)
@@ -376,13 +363,6 @@ def _described(
 #: What H prints of the detector's numbers; the others it leaves open.
 PUBLISHED = ("gradient", "smallest_area")
 
-_KINDS = {
-    "scaling": ("fixed", "stretched", "counts"),
-    "clipping": ("saturated", "normalised"),
-    "area_of": ("edges", "filled"),
-    "nested": ("boxes", "contours"),
-}
-
 
 @dataclass(frozen=True)
 class FloatingThresholds:
@@ -399,13 +379,9 @@ class FloatingThresholds:
     scaling
         How 14 bits become 8: ``"fixed"``, 256 grey levels over ``smallest_range_k``, from the
         ``stretched_share`` of an image's darkest pixels on; ``"stretched"``, from there to that share of its
-        brightest, over ``smallest_range_k`` at least; ``"counts"``, not at all: only the gradient of counts
-        has 8 bits. Grey levels stay as they are.
+        brightest, over ``smallest_range_k`` at least. Grey levels stay as they are.
     gradient_gain
         Factor before (4.3).
-    clipping
-        What lies beyond 255 in the gradient image: ``"saturated"``, or the image divided by its largest
-        gradient (``"normalised"``).
     area_of
         What the limits are for: the blob of steep pixels (``"edges"``, a ring if the inside is even), or the
         blob once it is filled (``"filled"``).
@@ -423,12 +399,11 @@ class FloatingThresholds:
     largest_area: float | None = None
     smoothing_size: int = 5
     smoothing_sd: float = 1.1
-    scaling: Literal["fixed", "stretched", "counts"] = "fixed"
+    scaling: Literal["fixed", "stretched"] = "fixed"
     stretched_share: float = 0.01
     smallest_range_k: float = 4.0
     counts_per_kelvin: float = 25.0
     gradient_gain: float = 1.0
-    clipping: Literal["saturated", "normalised"] = "saturated"
     area_of: Literal["edges", "filled"] = "edges"
     nested: Literal["boxes", "contours"] = "boxes"
     close_at_border: bool = True
@@ -447,46 +422,7 @@ class FloatingThresholds:
                 self.smoothing_size > 0 and self.smoothing_size % 2 == 1,
                 "give an odd number",
             ),
-            *(
-                (name, getattr(self, name) in known, f"use {' or '.join(map(repr, known))}")
-                for name, known in _KINDS.items()
-            ),
         )
         for field, fine, fix in limits:
             if not fine:
                 raise WildlabError(f"{field} is {getattr(self, field)!r}", fix, field=field)
-
-    def at_height(self, height: float, reference: float) -> FloatingThresholds:
-        """The same for another height, H 4.4.1: areas scaled by how large things look.
-
-        A filled area goes with the squared scale of the image; a contour, which is as wide as the blur at
-        every height, goes with the scale itself.
-
-        Parameters
-        ----------
-        height
-            Of the camera above the sea, m.
-        reference
-            Height for which these thresholds are, m.
-
-        Returns
-        -------
-        FloatingThresholds
-
-        Raises
-        ------
-        WildlabError
-            Where a height is not above zero.
-
-        Examples
-        --------
-        >>> FloatingThresholds(area_of="filled").at_height(200.0, 100.0).smallest_area
-        12.5
-        """
-        if not (height > 0 and reference > 0 and np.isfinite(height) and np.isfinite(reference)):
-            raise WildlabError(
-                f"heights of {height} and {reference} m", "give both above zero, in metres", field="height"
-            )
-        factor = (reference / height) ** (2 if self.area_of == "filled" else 1)
-        largest = None if self.largest_area is None else self.largest_area * factor
-        return replace(self, smallest_area=self.smallest_area * factor, largest_area=largest)

@@ -15,7 +15,6 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera, normalise
 from wildlab.geometry.frames import Array, Indices, Mask
 
@@ -87,25 +86,8 @@ def find_features(image: NDArray[Any], inside: Mask) -> Features:
     -------
     Features
         Each place once, also where a feature has two directions.
-
-    Raises
-    ------
-    WildlabError
-        Where the image is no grey image, or the mask has another size.
     """
     seen, mask = np.asarray(image), np.asarray(inside, bool)
-    if seen.ndim != 2 or seen.dtype.kind not in "uif":
-        raise WildlabError(
-            f"an image of the shape {seen.shape} and type {seen.dtype}",
-            "give a grey image: rows by columns of grey levels, counts or kelvin",
-            field="image",
-        )
-    if mask.shape != seen.shape:
-        raise WildlabError(
-            f"a mask of the shape {mask.shape} for an image of the shape {seen.shape}",
-            "give one value for each pixel",
-            field="inside",
-        )
     none = Features(np.zeros((0, 2)), np.zeros((0, 128), np.float32))
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     if not len(rows):
@@ -202,20 +184,13 @@ def nearest_by_ratio(
     return np.array([best[row][1] for row in there], np.intp), np.array(there, np.intp)
 
 
-def agreeing(
-    first: ArrayLike,
-    second: ArrayLike,
-    largest_turn: float = LARGEST_TURN,
-    smallest_sd: float = SMALLEST_SD,
-) -> Matches:
+def agreeing(first: ArrayLike, second: ArrayLike) -> Matches:
     """Those of some matches that moved with most of the others, by shift, turn and scale.
 
     Parameters
     ----------
     first, second
         (N, 2) px in either image.
-    largest_turn, smallest_sd
-        In place of `LARGEST_TURN` and `SMALLEST_SD`.
 
     Returns
     -------
@@ -233,12 +208,12 @@ def agreeing(
         return _none()
     along, across = float(motion[0, 0]), float(motion[1, 0])
     turned, scaled = np.arctan2(across, along), np.hypot(along, across) - 1
-    if max(abs(turned), abs(scaled)) > largest_turn:
+    if max(abs(turned), abs(scaled)) > LARGEST_TURN:
         return _none()
     here, there = here[rows], there[rows]
     left = there - moved_together(here, there)
     sd = float(np.sqrt((left**2).sum() / (left.size - 4)))
-    return Matches(here, there, max(sd, smallest_sd))
+    return Matches(here, there, max(sd, SMALLEST_SD))
 
 
 def moved_together(first: Array, second: Array) -> Array:
