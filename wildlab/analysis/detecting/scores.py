@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -27,7 +27,7 @@ from wildlab.evaluation.matching import (
 from wildlab.flight.files import printable
 from wildlab.flight.readers.labels import Labels, choose_classes, read_labels
 from wildlab.geometry.covariances import inside_ellipse
-from wildlab.geometry.frames import Array, Indices, Mask
+from wildlab.geometry.frames import Indices, Mask
 
 #: Probability of the ellipses that are held against labels.
 ELLIPSE = 0.9
@@ -164,30 +164,20 @@ def judge_detections(detections: pd.DataFrame, frames: pd.DataFrame, labels: Lab
     WildlabError
         Where no frame of the run is labelled.
     """
-    by_frame = dict(tuple(detections.groupby("frame_id", sort=False))) if len(detections) else {}
     counts: list[Indices] = []
     groups: list[str] = []
     rows: list[tuple[Any, ...]] = []
-    named = set()
     inside: list[Mask] = []
     unusable = outside = 0
-    columns = (frames[one] for one in ("frame_id", "width_px", "height_px"))
-    for frame, width, height, problem in zip(*columns, frames["problem"].fillna(""), strict=True):
-        name = labels.name_of(str(frame))
-        if name is None:
-            continue
-        named.add(name)
-        unusable += bool(problem)
-        own = by_frame.get(frame)
-        boxes = np.zeros((0, 4)) if own is None else own[_BOX].to_numpy(float)
-        scores = [] if own is None else own["score"].tolist()
-        centred = boxes if own is None else _about(own, boxes)
-        true, ignore = labels.boxes_of(str(frame), name, int(width), int(height))
+    judged = judged_frames(detections, frames, labels)
+    for frame, name, (width, height), problem, own, scored in judged:
+        unusable += problem
+        true, boxes = scored.labels, own[_BOX].to_numpy(float)
         if width and height:
             beyond = (true[:, :2] >= [width, height]) | (true[:, :2] + true[:, 2:] < 0)
             outside += int(beyond.any(axis=1).sum())
-        found = match(centred, true, ignore=ignore)
-        if own is not None and set(_COVARIANCE) <= set(own.columns) and len(found.pairs):
+        found = match(scored.boxes, true, ignore=scored.ignore)
+        if set(_COVARIANCE) <= set(own.columns) and len(found.pairs):
             covariance = own[_COVARIANCE].to_numpy(float)[found.pairs[:, 0]].reshape(-1, 2, 2)
             middle = true[:, :2] + true[:, 2:] / 2
             off = middle[found.pairs[:, 1]] - own[["u_px", "v_px"]].to_numpy(float)[found.pairs[:, 0]]
@@ -196,7 +186,7 @@ def judge_detections(detections: pd.DataFrame, frames: pd.DataFrame, labels: Lab
         counts.append(found.counts)
         groups.append(labels.group[name])
         verdicts = (("found", found.pairs[:, 0]), ("invented", found.invented), ("not judged", found.ignored))
-        rows += [(frame, word, *boxes[row], scores[row]) for word, which in verdicts for row in which]
+        rows += [(frame, word, *boxes[row], scored.scores[row]) for word, which in verdicts for row in which]
         rows += [(frame, "missed", *true[row], np.nan) for row in found.missed]
     if not counts:
         raise WildlabError(
@@ -204,7 +194,7 @@ def judge_detections(detections: pd.DataFrame, frames: pd.DataFrame, labels: Lab
             "give the labels of these frames: names are file names, numbers count a clip's frames from 0",
         )
     things = pd.DataFrame(rows, columns=["frame_id", "verdict", *_BOX, "score"])
-    absent = tuple(sorted(set(labels.boxes) - named))
+    absent = tuple(sorted(set(labels.boxes) - {one.name for one in judged}))
     return DetectorScore(
         rates(np.array(counts), groups), things, len(counts), len(frames) - len(counts), unusable, absent,
         outside, _share(inside),
@@ -216,33 +206,34 @@ def _share(inside: list[Mask]) -> Interval | None:
     return share_interval(int(all_of.sum()), len(all_of)) if len(all_of) else None
 
 
-def boxes_by_frame(
-    detections: pd.DataFrame,
-) -> dict[str, tuple[Array, Array]]:
-    """Boxes about the centroids, and scores, by the name of the frame.
+class JudgedFrame(NamedTuple):
+    """A labelled frame of a run: its name in the labels, width and height, whether it could not be used,
+    the rows of its detections, and boxes about their centroids, which are what is judged."""
 
-    Parameters
-    ----------
-    detections
-        As `wildlab.analysis.detecting.detect.Detected` has them.
-
-    Returns
-    -------
-    dict
-        (N, 4) left, top, width, height, px, and (N,).
-    """
-    if not len(detections):
-        return {}
-    return {
-        str(frame): (_about(own, own[_BOX].to_numpy(float)), own["score"].to_numpy(float))
-        for frame, own in detections.groupby("frame_id", sort=False)
-    }
+    frame: str
+    name: str
+    size: tuple[int, int]
+    problem: bool
+    own: pd.DataFrame
+    scored: ScoredFrame
 
 
-def _about(own: pd.DataFrame, boxes: Array) -> Array:
-    """Boxes of the same sizes about the centroids: it is these that are the detections."""
-    uv = own[["u_px", "v_px"]].to_numpy(float)
-    return np.concatenate([uv - boxes[:, 2:] / 2, boxes[:, 2:]], axis=1)
+def judged_frames(detections: pd.DataFrame, frames: pd.DataFrame, labels: Labels) -> list[JudgedFrame]:
+    """The frames of a run that labels name, in order."""
+    by_frame = dict(tuple(detections.groupby("frame_id", sort=False))) if len(detections) else {}
+    found = []
+    columns = (frames[one] for one in ("frame_id", "width_px", "height_px"))
+    for frame, width, height, problem in zip(*columns, frames["problem"].fillna(""), strict=True):
+        name = labels.name_of(str(frame))
+        if name is None:
+            continue
+        own, size = by_frame.get(frame, detections.iloc[:0]), (int(width), int(height))
+        true, ignore = labels.boxes_of(str(frame), name, *size)
+        sides = own[["width_px", "height_px"]].to_numpy(float)
+        boxes = np.concatenate([own[["u_px", "v_px"]].to_numpy(float) - sides / 2, sides], axis=1)
+        scored = ScoredFrame(boxes, own["score"].to_numpy(float), true, ignore)
+        found.append(JudgedFrame(str(frame), name, size, bool(problem), own, scored))
+    return found
 
 
 NOTHING = np.zeros((0, 4))
@@ -419,17 +410,10 @@ def compare_detectors(
     WildlabError
         Where a file says that a frame is of another size.
     """
-    judged = []
-    columns = (frames[one] for one in ("frame_id", "width_px", "height_px"))
-    for frame, width, height in zip(*columns, strict=True):
-        if (known := labels.name_of(str(frame))) is not None:
-            judged.append((str(frame), known, int(width), int(height)))
-    truth = [labels.boxes_of(frame, known, width, height) for frame, known, width, height in judged]
-    groups = [labels.group[known] for _, known, _, _ in judged]
-    ours = boxes_by_frame(detections)
-    empty = (NOTHING, np.zeros(0))
+    judged = judged_frames(detections, frames, labels)
+    groups = [labels.group[one.name] for one in judged]
     sets: list[tuple[str, list[Any], tuple[Fact, ...]]] = [
-        (name, [ours.get(frame, empty) for frame, _, _, _ in judged], ())
+        (name, [(one.scored.boxes, one.scored.scores) for one in judged], ())
     ]
     for other in others:
         boxes, told = _of_other(other, judged, labels.marked.relative)
@@ -437,7 +421,10 @@ def compare_detectors(
     result: list[Compared] = []
     first = None
     for called, found, told in sets:
-        scored = [ScoredFrame(a[0], a[1], b[0], b[1]) for a, b in zip(found, truth, strict=True)]
+        scored = [
+            one.scored._replace(boxes=boxes, scores=scores)
+            for one, (boxes, scores) in zip(judged, found, strict=True)
+        ]
         counts = np.array([match(one.boxes, one.labels, ignore=one.ignore).counts for one in scored])
         first = counts if first is None else first
         scores = np.concatenate([np.zeros(0), *(one.scores for one in scored)])
@@ -450,20 +437,20 @@ def compare_detectors(
 
 
 def _of_other(
-    other: Other, judged: list[tuple[str, str, int, int]], relative: bool
+    other: Other, judged: list[JudgedFrame], relative: bool
 ) -> tuple[list[tuple[Any, Any]], tuple[Fact, ...]]:
     """Boxes and scores of each judged frame, and what is to be told of the others."""
     boxes, seen = [], set()
     without, sizeless = 0, 0
-    for frame, _, width, height in judged:
-        name = other.boxes.name_of(frame)
+    for one in judged:
+        name = other.boxes.name_of(one.frame)
         if name is None:
             without += 1
             boxes.append((NOTHING, np.zeros(0)))
             continue
         seen.add(name)
-        own, scores = other.boxes.boxes_of(frame, name, width, height)[0], other.boxes.scores[name]
-        if not width and (relative or other.boxes.marked.relative):
+        own, scores = other.boxes.boxes_of(one.frame, name, *one.size)[0], other.boxes.scores[name]
+        if not one.size[0] and (relative or other.boxes.marked.relative):
             # Shares of an image that could not be read are nowhere: boxes on it cannot be right or wrong.
             sizeless += len(own)
             own, scores = NOTHING, np.zeros(0)
