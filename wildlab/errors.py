@@ -49,13 +49,6 @@ def above_zero(**values: float) -> None:
             raise WildlabError(f"{value} is not above zero", "give a number above zero", field=name)
 
 
-def share_below_one(**values: float) -> None:
-    """Refuse numbers, by their names, that are not from 0 to below 1."""
-    for name, value in values.items():
-        if not 0 <= value < 1:
-            raise WildlabError(f"{value} is no share", "give one from 0 to below 1", field=name)
-
-
 class RunFailed(WildlabError):
     """The input was fine and the work was not: a notebook raised, a time limit passed."""
 

@@ -36,9 +36,9 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.covariances import gate_threshold
 from wildlab.geometry.frames import Array, euler_to_matrix
 from wildlab.geometry.mount import R_MC_DOWN
-from wildlab.planning.areas import contains, rectangle
 from wildlab.planning.coverage import walks
 from wildlab.planning.gimbal import look_down
+from wildlab.planning.patterns import contains, rectangle
 from wildlab.planning.planner import SEARCH
 from wildlab.tracking import kalman
 from wildlab.tracking.particles import effective_size, walk_of

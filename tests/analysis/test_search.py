@@ -17,8 +17,7 @@ from wildlab.analysis.search import (
     search,
     survey,
 )
-from wildlab.planning.information import SearchSensor
-from wildlab.planning.legs import Flying, Leg, Platform, look_attitude
+from wildlab.planning.legs import Flying, Leg, Platform, SearchSensor, look_attitude
 from wildlab.planning.planner import SEARCH
 
 SENSOR = SearchSensor(0.3, 0.2, sd=0.2, reach=100.0, nearest=5.0)

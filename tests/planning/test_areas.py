@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wildlab.errors import WildlabError
-from wildlab.planning.areas import (
+from wildlab.planning.patterns import (
     check_area,
     contains,
     rectangle,

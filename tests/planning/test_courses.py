@@ -7,9 +7,8 @@ import pytest
 
 from tests.planning.ground import length
 from wildlab.geometry.frames import wrap
-from wildlab.planning.areas import rectangle
 from wildlab.planning.courses import dubins, fly
-from wildlab.planning.patterns import lawn_mower
+from wildlab.planning.patterns import lawn_mower, rectangle
 
 
 def curvature(points: np.ndarray) -> np.ndarray:

@@ -14,7 +14,6 @@ from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.mount import R_MC_DOWN, Mount
 from wildlab.geometry.terrain import Terrain
 from wildlab.geometry.viewsheds import visible_nodes
-from wildlab.planning.areas import check_area, contains
 from wildlab.planning.coverage import (
     Coverage,
     Sightings,
@@ -23,6 +22,7 @@ from wildlab.planning.coverage import (
     see,
     walks,
 )
+from wildlab.planning.patterns import check_area, contains
 from wildlab.simulation.landscape import synthetic_landscape
 
 CAMERA = Camera(720, 480, 1267.0, 1117.0, 356.0, 216.6, 0.0, (0.446, 0.0, 0.0, 0.0, 0.0))
@@ -131,7 +131,7 @@ def test_walks_stay_inside_and_begin_anywhere():
 
 def test_first_seen_is_the_first_sharp_image_with_the_nearest_node():
     flat = Terrain(np.zeros((5, 5), np.float32), north=0.0, east=0.0, step=10.0)
-    found = Sightings(np.array([0, 1, 1, 2]), np.array([6, 7, 12, 7]), np.zeros(4), np.zeros(4))
+    found = Sightings(np.array([0, 1, 1, 2]), np.array([6, 7, 12, 7]), np.zeros(4))
     times = np.array([0.0, 5.0, 9.0])
     there = np.array(
         [[12.0, 22.0], [18.0, 17.0], [40.0, 40.0], [-50.0, 0.0]]
@@ -143,5 +143,5 @@ def test_first_seen_is_the_first_sharp_image_with_the_nearest_node():
     assert np.array_equal(
         first_seen(found, flat, times, sharp, ways), [9, np.nan, np.nan, np.nan], equal_nan=True
     )
-    nothing = Sightings(np.zeros(0, int), np.zeros(0, int), np.zeros(0), np.zeros(0))
+    nothing = Sightings(np.zeros(0, int), np.zeros(0, int), np.zeros(0))
     assert np.isnan(first_seen(nothing, flat, times, sharp, ways)).all()

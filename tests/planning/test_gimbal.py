@@ -7,7 +7,6 @@ import pytest
 
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.terrain import Terrain
-from wildlab.planning.areas import rectangle
 from wildlab.planning.gimbal import (
     NADIR,
     GimbalAngles,
@@ -20,6 +19,7 @@ from wildlab.planning.gimbal import (
     swing_roll,
     view_inside,
 )
+from wildlab.planning.patterns import rectangle
 
 CAMERA = Camera(100, 80, 200.0, 200.0, 50.0, 40.0)
 FLAT = Terrain(np.zeros((3, 3), np.float32), north=-500.0, east=-500.0, step=500.0)

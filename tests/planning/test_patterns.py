@@ -9,18 +9,17 @@ import pytest
 from numpy.typing import NDArray
 
 from tests.planning.ground import length
-from wildlab.geometry.camera import Camera, project
-from wildlab.planning.areas import check_area, contains, rectangle
 from wildlab.planning.patterns import (
     AreaWay,
     Pattern,
-    footprint,
+    check_area,
+    contains,
     lawn_mower,
+    rectangle,
     visit_order,
 )
 
 U_SHAPE = [[0, 0], [100, 0], [100, 30], [30, 30], [30, 70], [100, 70], [100, 100], [0, 100]]
-CAMERA = Camera(720, 480, 1267.0, 1117.0, 356.0, 216.6, 0.0, (0.446, 0.0, 0.0, 0.0, 0.0))
 
 
 def star(seed: int, corners: int = 9) -> NDArray[np.float64]:
@@ -97,17 +96,3 @@ def test_several_areas_are_visited_in_the_shortest_order():
         found = visit_order(ways, start=[0.0, 0.0] if start else None, back=back)
         order, chosen = zip(*found, strict=True)
         assert flown(order, chosen, back, start) == pytest.approx(least)
-
-
-def test_the_footprint_is_the_largest_rectangle_that_every_edge_allows():
-    """Its corners and the middles of its sides project into the image, and its sides touch the edges."""
-    seen = footprint(CAMERA, 60.0)
-    assert footprint(CAMERA, 30.0).width == pytest.approx(seen.width / 2)  # F 8.2: linear with altitude
-    x, y = np.meshgrid(np.linspace(-60, 60, 1201), np.linspace(-60, 60, 1201))
-    uv = project(CAMERA, np.stack([x.ravel(), y.ravel(), np.full(x.size, 60.0)], axis=-1))
-    inside = ((uv >= 0) & (uv <= [719, 479])).all(axis=1).reshape(x.shape)
-    columns = inside[np.abs(y[:, 0]) < 5].all(axis=0)
-    assert columns.sum() * 0.1 >= seen.width - 0.2
-    # Nowhere does the image see less across than the rectangle, and somewhere nearly as little.
-    across = [row.sum() * 0.1 for row in inside[np.abs(y[:, 0]) < 0.4 * seen.length]]
-    assert seen.width - 0.2 <= min(across) < 1.1 * seen.width

@@ -9,7 +9,7 @@ import pytest
 from tests.studies.claims import checks_of, turn
 from wildlab.analysis.search import rows_at
 from wildlab.evaluation.shares import FAILS, HOLDS, decide, decide_check
-from wildlab.planning.areas import contains
+from wildlab.planning.patterns import contains
 from wildlab.studies.information_planning import (
     AHEAD,
     BUDGET_S,

@@ -17,15 +17,15 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array, Indices, Mask
 from wildlab.geometry.terrain import Terrain
 from wildlab.geometry.viewsheds import lines_clear
-from wildlab.planning.areas import contains
-from wildlab.planning.information import SearchSensor, detection_probability, in_field_of_view
-from wildlab.planning.legs import Flying, Leg, PatternPlanner, Platform, RandomWalk
-from wildlab.planning.patterns import lawn_mower
+from wildlab.planning.legs import Flying, Leg, PatternPlanner, Platform, RandomWalk, SearchSensor
+from wildlab.planning.patterns import contains, lawn_mower
 from wildlab.planning.planner import (
     SEARCH,
     InformationPlanner,
     all_positioned,
     best_goal,
+    detection_probability,
+    in_field_of_view,
     lost_by_covariance,
     lost_by_search,
 )

@@ -5,17 +5,15 @@ knows the map, the camera and its own plan; nothing of a simulation reaches it. 
 C. Christensson, Wildlife Surveillance Using a UAV and Thermal Imagery, master's thesis, Linköping University
 2016.
 
-- `wildlab.planning.areas`: polygons, checked; what lies in them.
-- `wildlab.planning.patterns`: lawn-mower patterns over one area and over several, in the order of the
-  shortest way (F 5.2).
+- `wildlab.planning.patterns`: areas, checked, and lawn-mower patterns over one or several, in the order of
+  the shortest way (F 5.2).
 - `wildlab.planning.courses`: the way that is flown through a pattern, with turns, wind, heights and times.
 - `wildlab.planning.gimbal`: strategies of a gimbal and how they blur images (F 5.4).
 - `wildlab.planning.coverage`: what images show of a terrain, how often, when last and how surely (F 5.8,
   5.9); animals that walk meanwhile.
-- `wildlab.planning.information`: what is known of each point of a grid, and what an image adds (F 5.3.2).
-- `wildlab.planning.planner`: where to fly and look next, by what is to be learnt; `legs`: what platform and
-  gimbal can do, and flights along way points or by chance.
-- `wildlab.planning.planner`: search on, or go back to an animal that is known (F 5.3.1).
+- `wildlab.planning.planner`: where to fly and look next, by what is to be learnt (F 5.3.2), and whether to go
+  back to an animal that is known (F 5.3.1); `legs`: what platform and gimbal can do, and flights along way
+  points or by chance.
 
 >>> from wildlab.planning.courses import fly
 >>> from wildlab.planning.patterns import lawn_mower

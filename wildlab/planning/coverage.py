@@ -14,13 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.ndimage import maximum_filter, minimum_filter
 
-from wildlab.errors import WildlabError, above_zero
 from wildlab.geometry.camera import Camera, normalise
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, Indices, Mask
 from wildlab.geometry.terrain import Terrain
 from wildlab.geometry.viewsheds import image_border, lines_clear, widest_view
-from wildlab.planning.areas import check_area, contains
+from wildlab.planning.patterns import check_area, contains
 
 
 class Coverage(NamedTuple):
@@ -147,18 +146,15 @@ class Sightings(NamedTuple):
         (S,) which node, counted row by row of the terrain.
     distance
         (S,) from the camera to the node, metres.
-    edge
-        (S,) how far it is from the nearest edge of the image, pixels.
     """
 
     image: Indices
     node: Indices
     distance: Array
-    edge: Array
 
     def take(self, which: Mask) -> Sightings:
         """Some of them, by (S,) bool."""
-        return Sightings(self.image[which], self.node[which], self.distance[which], self.edge[which])
+        return Sightings(self.image[which], self.node[which], self.distance[which])
 
 
 def see(
@@ -185,11 +181,6 @@ def see(
     -------
     Sightings
 
-    Raises
-    ------
-    WildlabError
-        Where the furthest distance is not above zero and finite, or poses are not one row of instants.
-
     Examples
     --------
     >>> import numpy as np
@@ -200,9 +191,6 @@ def see(
     >>> print(np.bincount(see(flat, poses, 100.0).image))
     [121 121]
     """
-    above_zero(furthest=furthest)
-    if len(poses.rows) != 1:
-        raise WildlabError(f"poses with the rows {poses.rows}", "give one row of instants", field="poses")
     p, R = np.asarray(poses.p_nc, float), np.asarray(poses.R_nc, float)
     first, count = _blocks(terrain, poses.camera, p, R, furthest)
     # Compiled functions are imported where they are called: a compiler takes its time to be imported.
@@ -219,10 +207,10 @@ def see(
     )
     grid = np.array([terrain.north, terrain.east, terrain.step])
     with announced("the view over terrain"):
-        image, node, distance, edge, points = in_images(
+        image, node, distance, points = in_images(
             terrain.height, grid, lens, first, count, p.copy(), R.copy(), furthest
         )
-    found = Sightings(image, node, distance, edge)
+    found = Sightings(image, node, distance)
     if not hidden or not len(node):
         return found
     clear = [
@@ -325,14 +313,8 @@ def walks(
     Raises
     ------
     WildlabError
-        As `check_area`; where the spread of speeds is below zero or the step not above it.
+        As `check_area`.
     """
-    if not (speed_sd >= 0 and step > 0):
-        raise WildlabError(
-            f"speeds of {speed_sd} m/s that last {step} s",
-            "give zero or more, and more than zero",
-            field="step",
-        )
     corners = check_area(fence, "fence")
     t = np.asarray(times, float)
     here = _anywhere(corners, count, rng)

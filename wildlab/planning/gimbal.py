@@ -25,14 +25,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wildlab.errors import WildlabError, above_zero, share_below_one
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, Mask, euler_to_matrix, matrix_to_rotation_vector
 from wildlab.geometry.georeference import pixel_rays
 from wildlab.geometry.mount import R_MC_FORWARD
 from wildlab.geometry.terrain import Terrain, intersect_terrain
-from wildlab.planning.areas import contains
+from wildlab.planning.patterns import contains
 
 #: Straight down.
 NADIR = -np.pi / 2
@@ -89,19 +88,11 @@ def swing(times: ArrayLike, limit: float, rate: float, start: float = 0.0) -> Ar
     -------
     (N,) radians. It turns round in no time: a gimbal takes hundredths of a second.
 
-    Raises
-    ------
-    WildlabError
-        Where the limit is below zero or the rate not above it.
-
     Examples
     --------
     >>> print(swing([0.0, 1.0, 2.0, 3.0], limit=1.0, rate=1.0))
     [ 0.  1.  0. -1.]
     """
-    if not (np.isfinite(limit) and limit >= 0):
-        raise WildlabError(f"a swing to {limit} rad", "give an angle of zero or more", field="limit")
-    above_zero(rate=rate)
     t = np.asarray(times, float)
     if limit == 0:
         return np.zeros(t.shape)
@@ -237,15 +228,8 @@ def blur(camera: Camera, poses: CameraPoses, times: ArrayLike, exposure: float, 
     -------
     (N,) pixels: angular rate, and speed over distance, each times exposure and focal length. Their sum bounds
     what both do together. A turn about the optical axis counts at the image's corner.
-
-    Raises
-    ------
-    WildlabError
-        Where there are fewer than two times.
     """
     t = np.asarray(times, float)
-    if len(t) < 2:
-        raise WildlabError(f"{len(t)} instant", "give two at least: a rate needs a difference", field="times")
     step = np.diff(t)
     turned = matrix_to_rotation_vector(np.swapaxes(poses.R_nc[:-1], -1, -2) @ poses.R_nc[1:]) / step[:, None]
     moved = np.linalg.norm(np.diff(poses.p_nc, axis=0), axis=1) / step
@@ -340,11 +324,6 @@ def adapt_roll(
     -------
     GimbalAngles
 
-    Raises
-    ------
-    WildlabError
-        Where the limits are not in order, or the rate is not above zero.
-
     Examples
     --------
     Outside at all times it swings between the least limits:
@@ -354,11 +333,6 @@ def adapt_roll(
     [ 0.  1.  0. -1.  0.]
     """
     least, most = limits
-    if not 0 <= least <= most < np.inf:
-        raise WildlabError(
-            f"limits of {least} and {most} rad", "give the smaller one first, zero or more", field="limits"
-        )
-    above_zero(rate=rate)
     t, known = np.asarray(times, float), np.asarray(rolls, float)
     roll = np.zeros(len(t))
     phase = float(np.mod(start + 0.25, 1.0))
@@ -394,16 +368,9 @@ def swing_rate(limit: float, length: float, speed: float, overlap: float = 0.0) 
     -------
     float, radians per second.
 
-    Raises
-    ------
-    WildlabError
-        Where one of them is not above zero, or the overlap is not from 0 to below 1.
-
     Examples
     --------
     >>> swing_rate(limit=0.5, length=20.0, speed=5.0)
     0.5
     """
-    above_zero(limit=limit, length=length, speed=speed)
-    share_below_one(overlap=overlap)
     return 4 * limit * speed / (length * (1 - overlap))

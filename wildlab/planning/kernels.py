@@ -35,6 +35,17 @@ def inverse_trace(a: float, b: float, c: float, d: float, e: float, f: float) ->
 
 
 @compiled
+def inverse_traces(Y: Array) -> Array:
+    """tr(Y^-1) of each matrix (N, 3, 3), (N,). By pivots rather than by the determinant: where one direction
+    is known ten million times better than another, that loses all digits."""
+    out = np.empty(len(Y))
+    for i in range(len(Y)):
+        y = Y[i]
+        out[i] = inverse_trace(y[0, 0], y[0, 1], y[0, 2], y[1, 1], y[1, 2], y[2, 2])
+    return out
+
+
+@compiled
 def add_image(
     points: Array, near: Array, cam: Array, R: Array, clear: Array, half: Array, sd: float, reach: float,
     nearest: float, into: Array, seen: Array,
@@ -88,14 +99,14 @@ def close_points(points: Array, weights: Array, cam: Array, limit: float) -> Arr
 @compiled
 def gains_of_steps(
     Y: Array, left: Array, weights: Array, points: Array, parents: Array, cams: Array, R: Array,
-    counts: Array, limits: Array, clear: Array, half: Array, sd: float, reach: float, nearest: float,
+    counts: Array, limits: Array, half: Array, sd: float, reach: float, nearest: float,
 ) -> Array:  # fmt: skip
     """By how much candidate steps would lower what is left to know, (K, G) m^2.
 
     ``Y`` (B, N, 3, 3) and ``left`` (B, N) are those of the states that steps begin in, ``parents`` (K,) says
     which. ``cams`` (K, L, 3) are the images' positions of a step, ``R`` (K, G, 3, 3) and ``counts``
     (K, G, L) the attitudes to choose from; no image of a step shows a point further than ``limits`` (K,) from
-    where the step ends, seen from above. ``clear`` is (K, L, N), or (0, 0, 0) where nothing hides anything.
+    where the step ends, seen from above. Nothing hides anything.
     """
     out = np.zeros((len(parents), R.shape[1]))
     into = np.zeros((len(points), 6))
@@ -107,9 +118,8 @@ def gains_of_steps(
         for g in range(R.shape[1]):
             for image in range(cams.shape[1]):
                 if counts[k, g, image]:
-                    lines = clear[k, image] if len(clear) else free
                     add_image(
-                        points, near, cams[k, image], R[k, g], lines, half, sd, reach, nearest, into, seen
+                        points, near, cams[k, image], R[k, g], free, half, sd, reach, nearest, into, seen
                     )
             for i in near:
                 if not seen[i]:
@@ -219,14 +229,14 @@ def edge_of(lens: Array, x: float, y: float, z: float) -> float:
 @compiled
 def in_images(
     height: Array, grid: Array, lens: Array, first: Array, count: Array, p: Array, R: Array, furthest: float
-) -> tuple[Array, Array, Array, Array, Array]:
+) -> tuple[Array, Array, Array, Array]:
     """Nodes within each image's block that are in the image and not too far.
 
-    ``grid`` is north and east of the first node, and the step. Image, node, distance, edge, points (S, 3).
+    ``grid`` is north and east of the first node, and the step. Image, node, distance, points (S, 3).
     """
     room = 1024
     image, node = np.empty(room, np.int64), np.empty(room, np.int64)
-    distance, edge, points = np.empty(room), np.empty(room), np.empty((room, 3))
+    distance, points = np.empty(room), np.empty((room, 3))
     n = 0
     columns = height.shape[1]
     for k in range(len(p)):
@@ -249,14 +259,14 @@ def in_images(
                 if n == room:
                     room *= 2
                     image, node = grown(image, room), grown(node, room)
-                    distance, edge = grown(distance, room), grown(edge, room)
+                    distance = grown(distance, room)
                     more = np.empty((room, 3))
                     more[:n] = points
                     points = more
-                image[n], node[n], distance[n], edge[n] = k, i * columns + j, far, inside
+                image[n], node[n], distance[n] = k, i * columns + j, far
                 points[n, 0], points[n, 1], points[n, 2] = north, east, down
                 n += 1
-    return image[:n], node[:n], distance[:n], edge[:n], points[:n]
+    return image[:n], node[:n], distance[:n], points[:n]
 
 
 @compiled

@@ -15,26 +15,181 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wildlab.errors import WildlabError, above_zero, share_below_one
-from wildlab.geometry.camera import Camera, normalise
-from wildlab.geometry.frames import Array, Indices
-from wildlab.planning.areas import check_area, edge_directions
+from wildlab.errors import WildlabError, above_zero
+from wildlab.geometry.compilation import compiled
+from wildlab.geometry.frames import Array, Indices, Mask
+
+#: Corners nearer to one another than this are one corner, metres; and what counts as on a border.
+SAME = 1e-6
+#: Areas below this cannot be searched, square metres.
+LEAST = 1e-3
+#: Directions of rows that are tried at most.
+MOST_DIRECTIONS = 60
+
+
+def check_area(corners: ArrayLike, name: str = "area") -> Array:
+    """A polygon that can be searched: clockwise as seen from above, not closed, no corner twice.
+
+    Parameters
+    ----------
+    corners
+        (K, 2) north and east, metres, in either sense; the first may stand at the end once more.
+    name
+        Of the area, for messages.
+
+    Returns
+    -------
+    (K', 2) metres.
+
+    Raises
+    ------
+    WildlabError
+        Where it has fewer than three corners, corners that are not numbers, or no extent.
+
+    Examples
+    --------
+    >>> print(check_area([[0, 0], [0, 10], [20, 10], [20, 0], [0, 0]]))
+    [[20.  0.]
+     [20. 10.]
+     [ 0. 10.]
+     [ 0.  0.]]
+    """
+    points = np.asarray(corners, float)
+    if points.ndim != 2 or points.shape[-1] != 2:
+        raise WildlabError(f"corners of the shape {points.shape}", "give rows of north and east", field=name)
+    if not np.isfinite(points).all():
+        row = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
+        raise WildlabError(
+            f"corner {row + 1} is not a number", "give north and east of every corner in metres", field=name
+        )
+    points = points[np.linalg.norm(points - np.roll(points, -1, axis=0), axis=1) > SAME]
+    if len(points) < 3:
+        raise WildlabError(
+            f"the polygon has {len(points)} different corner{'s' * (len(points) != 1)}",
+            "give three at least",
+            field=name,
+        )
+    signed = _signed_area(points)
+    if abs(signed) < LEAST:
+        raise WildlabError(
+            f"the polygon has an area of {abs(signed):.2g} m2",
+            "its corners lie on one line: move one",
+            field=name,
+        )
+    # North to the first axis, east to the second: positive is clockwise from above.
+    return points if signed > 0 else np.ascontiguousarray(points[::-1])
+
+
+def contains(corners: ArrayLike, points: ArrayLike) -> Mask:
+    """Which points lie in a polygon, by counting the edges that a line to the north crosses.
+
+    Parameters
+    ----------
+    corners
+        (K, 2) metres.
+    points
+        (..., 2) metres, north and east. On the border either answer may come out.
+
+    Returns
+    -------
+    (...) bool; False of NaN.
+
+    Examples
+    --------
+    >>> contains([[0, 0], [0, 10], [20, 10], [20, 0]], [[5, 5], [25, 5]])
+    array([ True, False])
+    """
+    asked = np.asarray(points, float)
+    fence = np.ascontiguousarray(corners, float)
+    return _contains(fence, np.ascontiguousarray(asked.reshape(-1, 2))).reshape(asked.shape[:-1])
+
+
+@compiled
+def _contains(fence: Array, points: Array) -> Mask:
+    north, east = fence.T
+    inside = np.zeros(len(points), np.bool_)
+    for k in range(len(fence)):
+        if east[k - 1] == east[k]:
+            continue
+        slope = (north[k] - north[k - 1]) / (east[k] - east[k - 1])
+        for i in range(len(points)):
+            if (east[k - 1] > points[i, 1]) != (east[k] > points[i, 1]):
+                inside[i] ^= points[i, 0] < north[k - 1] + (points[i, 1] - east[k - 1]) * slope
+    return inside
+
+
+def rectangle(north: float, east: float, length: float, width: float, course: float) -> Array:
+    """Corners of a rectangle about its middle, (4, 2) metres, clockwise.
+
+    Parameters
+    ----------
+    north, east
+        Of its middle, metres.
+    length, width
+        Along the course and across it, metres.
+    course
+        From north to the east, radians.
+
+    Returns
+    -------
+    (4, 2) metres.
+
+    Examples
+    --------
+    >>> print(rectangle(0.0, 0.0, 4.0, 2.0, 0.0))
+    [[ 2.  1.]
+     [-2.  1.]
+     [-2. -1.]
+     [ 2. -1.]]
+    """
+    along = np.array([np.cos(course), np.sin(course)])
+    across = np.array([-along[1], along[0]])
+    signs = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) / 2
+    corners = np.array([north, east]) + length * signs[:, :1] * along + width * signs[:, 1:] * across
+    return check_area(corners, "rectangle")
+
+
+def _signed_area(points: Array) -> float:
+    # About the first corner: far from the origin a cross product loses digits.
+    p = points - points[0]
+    q = np.roll(p, -1, axis=0)
+    return float((p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]).sum() / 2)
+
+
+def edge_directions(corners: ArrayLike, most: int = MOST_DIRECTIONS) -> Array:
+    """Directions of the edges of a fence, of those that differ the ones of the longest edges.
+
+    Parameters
+    ----------
+    corners
+        (K, 2) north and east, metres.
+    most
+        How many at most.
+
+    Returns
+    -------
+    (D,) radians from 0 to below pi: a direction and its reverse are the same rows; the longest edge's first.
+
+    Examples
+    --------
+    >>> print(edge_directions([[0, 0], [0, 40], [100, 40], [100, 0]]))
+    [0.         1.57079633]
+    """
+    fence = np.asarray(corners, float)
+    edges = np.roll(fence, -1, axis=0) - fence
+    edges = edges[np.argsort(-np.linalg.norm(edges, axis=1), kind="stable")]
+    angles = np.mod(np.arctan2(edges[:, 1], edges[:, 0]), np.pi)
+    angles = np.where(np.pi - angles < 1e-9, 0.0, angles)
+    # Of a fence with very many corners the edges that differ, and of these the longest.
+    coarse = (
+        np.round(angles, 2) if len(edges) <= MOST_DIRECTIONS else np.round(MOST_DIRECTIONS * angles / np.pi)
+    )
+    _, first = np.unique(coarse, return_index=True)
+    return angles[np.sort(first)][:most]
+
 
 #: More rows than this over one area are a slip of a unit.
 MOST_ROWS = 5000
-
-
-class Footprint(NamedTuple):
-    """The largest upright rectangle within what a level camera sees that looks straight down, metres.
-
-    Attributes
-    ----------
-    width, length
-        Along the rows and along the columns of the image.
-    """
-
-    width: float
-    length: float
 
 
 class Pattern(NamedTuple):
@@ -67,72 +222,6 @@ class Pattern(NamedTuple):
         return float(np.linalg.norm(np.diff(self.waypoints, axis=0), axis=1).sum())
 
 
-def footprint(camera: Camera, height: float) -> Footprint:
-    """What a camera that looks straight down surely sees of flat ground.
-
-    Parameters
-    ----------
-    camera
-        The intrinsic parameters; distortion is taken off, so the edges of the footprint are curved, and the
-        rectangle lies within them.
-    height
-        Of the lens above the ground, metres.
-
-    Returns
-    -------
-    Footprint
-
-    Raises
-    ------
-    WildlabError
-        Where the height is not above zero.
-
-    Examples
-    --------
-    >>> footprint(Camera(100, 50, fx=99.0, fy=49.0, cx=49.5, cy=24.5), 10.0)
-    Footprint(width=10.0, length=10.0)
-    """
-    above_zero(height=height)
-    right, low = camera.width - 1.0, camera.height - 1.0
-    u, v = np.linspace(0, right, 65), np.linspace(0, low, 65)
-    xy = [
-        normalise(camera, np.stack(np.broadcast_arrays(*edge), axis=-1))
-        for edge in ((0.0, v), (right, v), (u, 0.0), (u, low))
-    ]
-    width = float(xy[1][:, 0].min() - xy[0][:, 0].max())
-    length = float(xy[3][:, 1].min() - xy[2][:, 1].max())
-    return Footprint(round(width * height, 9), round(length * height, 9))
-
-
-def row_distance(width: float, overlap: float = 0.0) -> float:
-    """Distance between rows for which neighbouring strips share a part of their width.
-
-    Parameters
-    ----------
-    width
-        Of the strip that one row sees, metres.
-    overlap
-        Share of it that the next row sees again, from 0 to below 1.
-
-    Returns
-    -------
-    float, metres.
-
-    Raises
-    ------
-    WildlabError
-        Where the width is not above zero, or the overlap is not from 0 to below 1.
-
-    Examples
-    --------
-    >>> row_distance(30.0, 0.2)
-    24.0
-    """
-    above_zero(width=width)
-    share_below_one(overlap=overlap)
-    return width * (1 - overlap)
-
-
 def lawn_mower(
     corners: ArrayLike,
     distance: float,
@@ -152,7 +241,7 @@ def lawn_mower(
     corners
         (K, 2) north and east, metres.
     distance
-        Between rows at most, metres; see `row_distance`.
+        Between rows at most, metres.
     direction
         Of the rows, from north to the east, radians; None takes the one, of those along the fence's edges,
         that needs the shortest rows, counting ``turn`` for each.
@@ -187,9 +276,9 @@ def lawn_mower(
 
 def lawn_mowers(
     areas: Sequence[ArrayLike],
-    distance: float | Sequence[float],
+    distance: float,
     *,
-    directions: Sequence[float | None] | None = None,
+    directions: Sequence[float] | None = None,
     turn: float = 0.0,
     start: ArrayLike | None = None,
     back: bool = False,
@@ -201,9 +290,9 @@ def lawn_mowers(
     areas
         Each (K, 2) north and east, metres.
     distance
-        Between rows, for all or for each, metres.
+        Between rows at most, metres.
     directions
-        Of the rows of each area, radians, None where it is to be chosen as in `lawn_mower`.
+        Of the rows of each area, radians; None chooses them as in `lawn_mower`.
     turn
         As for `lawn_mower`.
     start
@@ -218,28 +307,17 @@ def lawn_mowers(
     Raises
     ------
     WildlabError
-        As `lawn_mower`; where there is no area, or not one distance, direction or place for each.
+        As `lawn_mower`.
 
     Examples
     --------
-    >>> from wildlab.planning.areas import rectangle
     >>> fields = [rectangle(0.0, east, 100.0, 40.0, 0.0) for east in (0.0, 200.0, 100.0)]
     >>> print(lawn_mowers(fields, 20.0, start=[-100.0, 0.0]).area)
     [0 0 2 2 1 1]
     """
-    if not len(areas):
-        raise WildlabError("there is no area", "give one at least", field="areas")
-    apart = np.atleast_1d(np.asarray(distance, float))
-    apart = np.repeat(apart, len(areas)) if np.ndim(distance) == 0 else apart
-    wanted: list[float | None] = [None] * len(areas) if directions is None else list(directions)
-    for given, what in ((len(apart), "distance"), (len(wanted), "directions")):
-        if given != len(areas):
-            raise WildlabError(f"{given} values for {len(areas)} areas", "give one for each", field=what)
+    wanted: Sequence[float | None] = [None] * len(areas) if directions is None else directions
     fences = [check_area(one, f"area {k + 1}") for k, one in enumerate(areas)]
-    inner = [
-        _block_ways(fence, float(d), angle, turn)
-        for fence, d, angle in zip(fences, apart, wanted, strict=True)
-    ]
+    inner = [_block_ways(fence, distance, angle, turn) for fence, angle in zip(fences, wanted, strict=True)]
     chosen = visit_order([ways for ways, _ in inner], start=start, back=back)
     rows, area, way = [], [], []
     for k, which in chosen:
@@ -434,11 +512,6 @@ def visit_order(
     -------
     Of each visit the number of the area and of its way.
 
-    Raises
-    ------
-    WildlabError
-        Where an area has no way.
-
     Examples
     --------
     >>> import numpy as np
@@ -447,8 +520,6 @@ def visit_order(
     >>> visit_order(there, start=[0.0, 0.0])
     [(1, 0), (2, 0), (0, 0)]
     """
-    if any(not len(one) for one in ways):
-        raise WildlabError("an area has no way over it", "give one at least for each", field="ways")
     costs = _Costs(ways, start, back)
     if len(ways) <= EXACT:
         return costs.exact()

@@ -1,5 +1,11 @@
 """Where to fly and look next, and when to go back to an animal that is known: F 5.3.1 and 5.3.2.
 
+Where an animal stands that is at a grid point is known with the covariance P (3, 3), and Y is its inverse. An
+image that shows the point adds what two angles tell (5.4), less where an animal may be missed (5.10), and
+with time it wears off (5.5); `kernels` has both. What is left to be known is the sum of all tr(Y^-1), (5.6).
+F writes this in east-north-up; here it is n, north-east-down. Where the print contradicts itself,
+``docs/contradictions.md`` says what holds.
+
 A planner looks some steps ahead, of which the first is flown; then it plans anew. A step is a straight leg of
 a few seconds on one of several headings, with the camera at one of several angles. All that a planner knows
 is the grid with its information, the ground, and the camera; where animals are it is not told.
@@ -12,7 +18,6 @@ done, and both rules by which an animal that was known is lost.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import permutations
 from typing import NamedTuple
 
 import numpy as np
@@ -22,17 +27,100 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array, Indices, Mask
 from wildlab.geometry.terrain import Terrain
 from wildlab.geometry.viewsheds import lines_clear
-from wildlab.planning.information import SearchSensor, trace_of_inverse
 from wildlab.planning.legs import (
     Flying,
     Leg,
     Platform,
+    SearchSensor,
     heading_change,
     leg_positions,
     look_attitude,
     sideways_limit,
     turn_between,
 )
+
+
+def in_field_of_view(points: ArrayLike, p_nc: ArrayLike, R_nc: ArrayLike, sensor: SearchSensor) -> Mask:
+    """Which points lie in the field of view, F (2.22)-(2.23); what hides them is not asked.
+
+    Parameters
+    ----------
+    points
+        (N, 3) in n, m.
+    p_nc
+        Of the camera, (3,), m.
+    R_nc
+        (3, 3), takes a vector from c (z out of the lens) to n.
+    sensor
+        Its half angles are used.
+
+    Returns
+    -------
+    (N,) bool.
+    """
+    x, y, z = ((np.asarray(points, float) - np.asarray(p_nc, float)) @ np.asarray(R_nc, float)).T
+    inside = (np.abs(x) <= sensor.half_width * z) & (np.abs(y) <= sensor.half_height * z)
+    return np.asarray(inside & (z > 0))
+
+
+def detection_probability(
+    points: ArrayLike,
+    p_nc: ArrayLike,
+    R_nc: ArrayLike,
+    sensor: SearchSensor,
+) -> Array:
+    """With which probability an animal at a point is found in one image, F (5.8) with (5.9).
+
+    Parameters
+    ----------
+    points
+        (N, 3) in n, m.
+    p_nc
+        Of the camera, (3,), m.
+    R_nc
+        (3, 3), takes a vector from c to n.
+    sensor
+        Field of view and reach; what hides the point is not asked.
+
+    Returns
+    -------
+    (N,) from 0 to 1; 0 outside of the field of view.
+
+    Examples
+    --------
+    >>> down = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    >>> sensor = SearchSensor(0.3, 0.2, sd=0.01, reach=100.0)
+    >>> ground = [[0.0, 0.0, 0.0], [0.0, 80.0, 0.0]]
+    >>> print(np.round(detection_probability(ground, [0.0, 0.0, -50.0], down, sensor), 2))
+    [0.78 0.  ]
+    """
+    away = np.asarray(points, float) - np.asarray(p_nc, float)
+    seen = in_field_of_view(points, p_nc, R_nc, sensor)
+    return np.where(seen, np.exp(-(away**2).sum(axis=-1) / sensor.reach**2), 0.0)
+
+
+def initial_information(count: int, sd: ArrayLike) -> Array:
+    """What is known before the first image: a small value on the diagonal, for F (5.10) asks for an inverse.
+
+    Parameters
+    ----------
+    count
+        N, of grid points.
+    sd
+        How far off an animal may be in each direction, m: one number as F has it, or (3,) north, east, down.
+        Where the terrain is known, the third is its own standard deviation.
+
+    Returns
+    -------
+    (N, 3, 3) 1/m^2.
+
+    Examples
+    --------
+    >>> print(np.diag(initial_information(1, [50.0, 50.0, 1.0])[0]))
+    [4.e-04 4.e-04 1.e+00]
+    """
+    each = np.broadcast_to(np.asarray(sd, float), (3,))
+    return np.tile(np.diag(1 / each**2), (count, 1, 1))
 
 
 @dataclass(frozen=True)
@@ -90,19 +178,13 @@ class InformationPlanner:
         (N, 3) of the grid in n, m.
     Y
         (N, 3, 3) information of each at the beginning, 1/m^2, as
-        `wildlab.planning.information.initial_information` has it.
+        `initial_information` has it.
     terrain
         Ground over which the platform keeps its height.
     sensor, flying, horizon
         What the camera sees, what the platform can do, and how steps are chosen.
-    hides
-        Whether the ground can hide points from where candidate steps look; without, candidates take all lines
-        of sight for clear, which is exact where no slope is as steep as a line of sight, and far quicker.
 
-    Raises
-    ------
-    WildlabError
-        Where there are not as many matrices as points, or nothing is known of a point at all.
+    Candidate steps take all lines of sight for clear, which is exact where no slope is as steep as one.
     """
 
     def __init__(
@@ -113,27 +195,14 @@ class InformationPlanner:
         sensor: SearchSensor,
         flying: Flying,
         horizon: Horizon,
-        *,
-        hides: bool = False,
     ) -> None:
+        from wildlab.planning.kernels import inverse_traces
+
         self.points = np.ascontiguousarray(points, float)
         self.Y = np.array(Y, float)
-        if self.Y.shape != (len(self.points), 3, 3):
-            raise WildlabError(
-                f"{len(self.points)} points and matrices of the shape {self.Y.shape}",
-                "give one matrix (3, 3) for each point",
-                field="Y",
-            )
-        self.left = np.array(trace_of_inverse(self.Y))
-        if not np.isfinite(self.left).all():
-            raise WildlabError(
-                f"of {int((~np.isfinite(self.left)).sum())} points nothing is known in some direction",
-                "begin with a small value on the diagonal (initial_information)",
-                field="Y",
-            )
+        self.left = inverse_traces(self.Y)
         self.weights = np.ones(len(self.points))
         self.terrain, self.sensor, self.flying, self.horizon = terrain, sensor, flying, horizon
-        self.hides = hides
         self._near = horizon.steps * flying.speed * flying.step
         # What lies beyond the horizon is weighed by blocks, two steps wide.
         corner = np.floor(self.points[:, :2] / (2 * flying.speed * flying.step)).astype(np.int64)
@@ -207,12 +276,10 @@ class InformationPlanner:
             # In steps, as fading is: turns up to here delay what follows.
             delay = late[parents] + waits / self.flying.step
             fade = h.fades ** (ahead + delay)
-            reach = self._reach(cams, R)
-            clear = self._clear(cams, reach)
-            limits = reach.max(axis=1) + self.flying.speed * self.flying.step
+            limits = self._reach(cams, R).max(axis=1) + self.flying.speed * self.flying.step
             gains = gains_of_steps(
-                Y, left, self.weights, self.points, parents, cams, R, counts, limits, clear, self._half,
-                s.sd, s.reach, s.nearest,
+                Y, left, self.weights, self.points, parents, cams, R, counts, limits, self._half, s.sd,
+                s.reach, s.nearest,
             )  # fmt: skip
             off = ~np.isfinite(cams).all(axis=(1, 2))
             tail = worth_beyond(blocks, self._middles, parents, cams[:, -1], length)
@@ -233,11 +300,10 @@ class InformationPlanner:
             worth, gained, late = value[ks, gs], gained[parents[ks]] + gains[ks, gs], delay[ks]
             if ahead + 1 < h.steps:
                 Y, left = Y[parents[ks]].copy(), left[parents[ks]].copy()
-                for n, (k, leg) in enumerate(zip(ks, legs, strict=True)):
-                    lines = clear[k] if len(clear) else np.zeros((0, 0), bool)
+                for n, leg in enumerate(legs):
                     after_images(
-                        Y[n], left[n], self.weights, self.points, leg.p_nc, leg.R_nc, leg.counts, lines,
-                        self._half, s.sd, s.reach, s.nearest,
+                        Y[n], left[n], self.weights, self.points, leg.p_nc, leg.R_nc, leg.counts,
+                        np.zeros((0, 0), bool), self._half, s.sd, s.reach, s.nearest,
                     )  # fmt: skip
                 states = [leg.end for leg in legs]
         return Chosen(first[0], float(gained[0]))
@@ -276,10 +342,6 @@ class InformationPlanner:
         """(K, L) how far sideways images with the attitudes (K, G, 3, 3) show any point, m."""
         depth = np.nan_to_num(float(self.points[:, 2].max()) - cams[..., 2])
         return np.asarray(sideways_limit(R, 1.0, self.sensor).max(axis=1)[:, None] * depth)
-
-    def _clear(self, cams: Array, reach: Array) -> Mask:
-        """As `_lines`, or (0, 0, 0) where candidates take all lines of sight for clear."""
-        return self._lines(cams, reach) if self.hides else np.zeros((0, 0, 0), bool)
 
     def _lines(self, cams: Array, reach: Array) -> Mask:
         """(K, L, N) whether nothing hides a point that counts and lies within reach (K, L)."""
@@ -422,119 +484,3 @@ def lost_by_search(missed: ArrayLike, doubt: float) -> Mask:
     (m,) bool.
     """
     return np.asarray(np.asarray(missed, float) < doubt)
-
-
-class Tour(NamedTuple):
-    """A way to a number of goals.
-
-    Attributes
-    ----------
-    path
-        (T, 2) m.
-    time
-        s until the last goal was reached.
-    order
-        Goals in the order in which they were reached, `SEARCH` for the way point.
-    broken_off
-        How often it turned to another goal before the one it was flying to was reached: the zigzag of F
-        figure 5.4.
-    """
-
-    path: Array
-    time: float
-    order: tuple[int, ...]
-    broken_off: int
-
-
-#: A tour by choices each second is given up after this, s.
-LONGEST_S = 3600.0
-
-
-def greedy_tour(
-    positions: ArrayLike,
-    covariances: ArrayLike,
-    platform: ArrayLike,
-    way_point: ArrayLike,
-    *,
-    alpha: float,
-    c: float,
-    speed: float,
-    walk: float,
-) -> Tour:
-    """What comes of choosing anew by F (5.3) all the time, until each animal and the way point were visited.
-
-    A goal that was reached is taken out: by the letter of (5.2) it would be worth more than all others for as
-    long as the platform is there, and it would stay for good.
-
-    Parameters
-    ----------
-    positions, covariances, platform, way_point, alpha, c
-        As `utilities` has them. An animal that is reached counts as found where it was expected.
-    speed
-        Of the platform, m/s.
-    walk
-        By how much variances grow, each way, m^2/s.
-
-    Returns
-    -------
-    Tour
-        Its time is infinite where it was given up.
-    """
-    at = np.asarray(positions, float).reshape(-1, 2)
-    P = np.array(covariances, float).reshape(-1, 2, 2)
-    here, end = np.asarray(platform, float).copy(), np.asarray(way_point, float)
-    path, order = [here.copy()], list[int]()
-    time, broken_off, last = 0.0, 0, None
-    while len(order) < len(at) + 1 and time < LONGEST_S:
-        there = np.array([one for one in range(len(at)) if one not in order], int)
-        goal = best_goal(at[there], P[there], here, None if SEARCH in order else end, alpha=alpha, c=c)
-        goal = SEARCH if goal == SEARCH else int(there[goal])
-        broken_off += last is not None and goal != last
-        aim = end if goal == SEARCH else at[goal]
-        away = float(np.hypot(*(aim - here)))
-        P += walk * np.eye(2)
-        if away <= speed:
-            here, last = aim.copy(), None
-            time += away / speed
-            order.append(goal)
-        else:
-            here += (aim - here) * (speed / away)
-            last, time = goal, time + 1.0
-        path.append(here.copy())
-    whole = len(order) == len(at) + 1
-    return Tour(np.array(path), time if whole else np.inf, tuple(order), broken_off)
-
-
-def shortest_tour(positions: ArrayLike, platform: ArrayLike, way_point: ArrayLike, speed: float) -> Tour:
-    """The quickest way to the same goals, by trying all orders: what a look ahead would have done.
-
-    Parameters
-    ----------
-    positions
-        (m, 2) m, of no more than eight animals.
-    platform, way_point
-        (2,) m.
-    speed
-        m/s.
-
-    Returns
-    -------
-    Tour
-
-    Raises
-    ------
-    WildlabError
-        Where there are more animals than can be tried.
-    """
-    at = np.asarray(positions, float).reshape(-1, 2)
-    if len(at) > 8:
-        raise WildlabError(f"{len(at)} animals have too many orders to try them all", "give eight at most")
-    goals = np.concatenate([at, np.asarray(way_point, float)[None]])
-    orders = np.array(list(permutations(range(len(goals)))))
-    ways = np.concatenate(
-        [np.broadcast_to(np.asarray(platform, float), (len(orders), 1, 2)), goals[orders]], axis=1
-    )
-    lengths = np.linalg.norm(np.diff(ways, axis=1), axis=-1).sum(axis=1)
-    best = int(np.argmin(lengths))
-    order = tuple(SEARCH if one == len(at) else int(one) for one in orders[best])
-    return Tour(ways[best], float(lengths[best]) / speed, order, 0)

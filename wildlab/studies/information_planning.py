@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from itertools import permutations
 from time import process_time
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from wildlab.analysis.search import (
     Rules,
@@ -28,10 +29,9 @@ from wildlab.analysis.search import (
 from wildlab.evaluation.intervals import mean_share_interval, share_interval
 from wildlab.geometry.frames import Array
 from wildlab.messages.quantities import percent_between
-from wildlab.planning.areas import rectangle
-from wildlab.planning.information import SearchSensor, initial_information
-from wildlab.planning.legs import Flying, Leg, Platform, look_attitude
-from wildlab.planning.planner import Horizon, InformationPlanner, Tour, greedy_tour, shortest_tour
+from wildlab.planning.legs import Flying, Leg, Platform, SearchSensor, look_attitude
+from wildlab.planning.patterns import rectangle
+from wildlab.planning.planner import SEARCH, Horizon, InformationPlanner, best_goal, initial_information
 from wildlab.reporting.charts.drawing import draw_way, finish
 from wildlab.reporting.charts.forms import Values, draw_fences, draw_heights, fit_map, lines_chart
 from wildlab.reporting.figures import (
@@ -50,6 +50,117 @@ from wildlab.simulation.landscape import synthetic_landscape
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.target_motion import reflected
 from wildlab.studies.uav_coverage import required
+
+
+class Tour(NamedTuple):
+    """A way to a number of goals.
+
+    Attributes
+    ----------
+    path
+        (T, 2) m.
+    time
+        s until the last goal was reached.
+    order
+        Goals in the order in which they were reached, `SEARCH` for the way point.
+    broken_off
+        How often it turned to another goal before the one it was flying to was reached: the zigzag of F
+        figure 5.4.
+    """
+
+    path: Array
+    time: float
+    order: tuple[int, ...]
+    broken_off: int
+
+
+#: A tour by choices each second is given up after this, s.
+LONGEST_S = 3600.0
+
+
+def greedy_tour(
+    positions: ArrayLike,
+    covariances: ArrayLike,
+    platform: ArrayLike,
+    way_point: ArrayLike,
+    *,
+    alpha: float,
+    c: float,
+    speed: float,
+    walk: float,
+) -> Tour:
+    """What comes of choosing anew by F (5.3) all the time, until each animal and the way point were visited.
+
+    A goal that was reached is taken out: by the letter of (5.2) it would be worth more than all others for as
+    long as the platform is there, and it would stay for good.
+
+    Parameters
+    ----------
+    positions, covariances, platform, way_point, alpha, c
+        As `wildlab.planning.planner.utilities` has them. An animal that is reached counts as found where
+        it was expected.
+    speed
+        Of the platform, m/s.
+    walk
+        By how much variances grow, each way, m^2/s.
+
+    Returns
+    -------
+    Tour
+        Its time is infinite where it was given up.
+    """
+    at = np.asarray(positions, float).reshape(-1, 2)
+    P = np.array(covariances, float).reshape(-1, 2, 2)
+    here, end = np.asarray(platform, float).copy(), np.asarray(way_point, float)
+    path, order = [here.copy()], list[int]()
+    time, broken_off, last = 0.0, 0, None
+    while len(order) < len(at) + 1 and time < LONGEST_S:
+        there = np.array([one for one in range(len(at)) if one not in order], int)
+        goal = best_goal(at[there], P[there], here, None if SEARCH in order else end, alpha=alpha, c=c)
+        goal = SEARCH if goal == SEARCH else int(there[goal])
+        broken_off += last is not None and goal != last
+        aim = end if goal == SEARCH else at[goal]
+        away = float(np.hypot(*(aim - here)))
+        P += walk * np.eye(2)
+        if away <= speed:
+            here, last = aim.copy(), None
+            time += away / speed
+            order.append(goal)
+        else:
+            here += (aim - here) * (speed / away)
+            last, time = goal, time + 1.0
+        path.append(here.copy())
+    whole = len(order) == len(at) + 1
+    return Tour(np.array(path), time if whole else np.inf, tuple(order), broken_off)
+
+
+def shortest_tour(positions: ArrayLike, platform: ArrayLike, way_point: ArrayLike, speed: float) -> Tour:
+    """The quickest way to the same goals, by trying all orders: what a look ahead would have done.
+
+    Parameters
+    ----------
+    positions
+        (m, 2) m.
+    platform, way_point
+        (2,) m.
+    speed
+        m/s.
+
+    Returns
+    -------
+    Tour
+    """
+    at = np.asarray(positions, float).reshape(-1, 2)
+    goals = np.concatenate([at, np.asarray(way_point, float)[None]])
+    orders = np.array(list(permutations(range(len(goals)))))
+    ways = np.concatenate(
+        [np.broadcast_to(np.asarray(platform, float), (len(orders), 1, 2)), goals[orders]], axis=1
+    )
+    lengths = np.linalg.norm(np.diff(ways, axis=1), axis=-1).sum(axis=1)
+    best = int(np.argmin(lengths))
+    order = tuple(SEARCH if one == len(at) else int(one) for one in orders[best])
+    return Tour(ways[best], float(lengths[best]) / speed, order, 0)
+
 
 #: The planners: by what is to be learnt, the same with its camera fixed straight down, rows with the camera
 #: straight down and from side to side, and by chance.

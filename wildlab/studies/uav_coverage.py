@@ -130,7 +130,7 @@ def plan(twin: TwinParameters, land: Terrain, case: Case, fields: int, rate: flo
     course = fly(pattern, speed, turn_time=stop)
     times = np.arange(0.0, course.duration, 1 / rate)
     places, headings = course.at(times)
-    way = follow_terrain(land, pattern.waypoints, case.height, climb=CLIMB, descent=CLIMB)
+    way = follow_terrain(land, pattern.waypoints, case.height, CLIMB)
     p = np.column_stack([places, -way.at(course.distances(times))])
     angles = look_down(times)
     if case.yaw:

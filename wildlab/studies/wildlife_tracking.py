@@ -42,11 +42,10 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
 from wildlab.messages.quantities import percent_between
-from wildlab.planning.areas import check_area, contains
 from wildlab.planning.courses import fly, follow_terrain
 from wildlab.planning.coverage import walks
 from wildlab.planning.gimbal import GimbalAngles, camera_on_course, swing_roll
-from wildlab.planning.patterns import Pattern, lawn_mowers
+from wildlab.planning.patterns import Pattern, check_area, contains, lawn_mowers
 from wildlab.reporting.charts.drawing import draw_dots, draw_way, finish
 from wildlab.reporting.charts.forms import draw_fences, fit_map, spread_points
 from wildlab.reporting.figures import (
@@ -178,7 +177,7 @@ def uav_way(twin: TwinParameters, land: Terrain, fences: list[Array], rate: floa
     course = fly(pattern, twin.flight.airspeed.si, turn_time=s.turn_time.si)
     times = np.arange(0.0, course.duration, 1 / rate)
     places, headings = course.at(times)
-    way = follow_terrain(land, pattern.waypoints, twin.flight.altitude.si, climb=uav.CLIMB, descent=uav.CLIMB)
+    way = follow_terrain(land, pattern.waypoints, twin.flight.altitude.si, uav.CLIMB)
     p = np.column_stack([places, -way.at(course.distances(times))])
     poses = camera_on_course(uav.camera_of(twin), p, headings, rolling(twin)(times))
     return Lap(times, headings, poses, course.duration)

@@ -24,7 +24,6 @@ from wildlab.geometry.frames import Array, Indices, Mask, rotation_vector_to_mat
 from wildlab.geometry.georeference import pixel_rays
 from wildlab.geometry.terrain import Terrain, intersect_terrain
 from wildlab.geometry.viewsheds import lines_clear
-from wildlab.planning.areas import contains
 from wildlab.planning.coverage import Coverage, from_sightings, see
 from wildlab.planning.gimbal import (
     GimbalAngles,
@@ -36,6 +35,7 @@ from wildlab.planning.gimbal import (
     swing_yaw,
     view_inside,
 )
+from wildlab.planning.patterns import contains
 from wildlab.simulation.error_models import gauss_markov
 
 #: Share of an image's shorter side that its edge is: what lies in it is not counted.

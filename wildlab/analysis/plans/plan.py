@@ -27,8 +27,7 @@ from wildlab.flight.readers.vector import Area, Areas, read_areas
 from wildlab.flight.terrain import CutOut, terrain_about
 from wildlab.geometry.frames import Array, geodetic_to_ned, ned_to_geodetic
 from wildlab.geometry.terrain import Terrain
-from wildlab.planning.areas import contains
-from wildlab.planning.patterns import Pattern, lawn_mowers, row_distance
+from wildlab.planning.patterns import Pattern, contains, lawn_mowers
 
 #: Metres above what the rules allow that are rounding.
 ROUNDING = 0.05
@@ -302,7 +301,7 @@ def make_plan(wanted: PlanRequest, terrain: Terrain | None = None) -> Plan:
     view = look(wanted.camera, wanted.tilt_deg, wanted.gimbal, wanted.swing_deg)
     height = _height(wanted, view)
     strip = view.width * height
-    distance = row_distance(strip, wanted.overlap)
+    distance = strip * (1 - wanted.overlap)
     home = None if wanted.home is None else _home(wanted.home, areas)
     cut = None
     if terrain is None and wanted.terrain is not None:

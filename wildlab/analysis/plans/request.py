@@ -21,10 +21,9 @@ from wildlab.flight.writers import Heights, Vehicle
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import Array, Mask
 from wildlab.geometry.georeference import intersect_plane, pixel_rays
-from wildlab.planning.areas import contains, edge_directions
 from wildlab.planning.courses import fly
 from wildlab.planning.gimbal import GimbalAngles, camera_attitudes
-from wildlab.planning.patterns import lawn_mower
+from wildlab.planning.patterns import contains, edge_directions, lawn_mower
 
 #: Points to a side on which overlapping areas are counted.
 ACROSS = 200

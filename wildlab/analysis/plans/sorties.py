@@ -14,7 +14,7 @@ from wildlab.analysis.plans.request import PlanRequest
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array, Indices, Mask
 from wildlab.geometry.terrain import Terrain
-from wildlab.planning.courses import Course, fly
+from wildlab.planning.courses import Course, fly, no_steeper
 from wildlab.planning.patterns import Pattern
 
 #: Metres above or below its height that a way may be between way points.
@@ -136,10 +136,7 @@ def follow(
     clear = _clear(places, terrain, clear_of(above, trees)) + trees
     wanted = np.fmax(ground + above, clear)
     if math.isfinite(steepest):
-        # The greatest of what every other place asks for, less what can be climbed or sunk on the way there.
-        before = np.maximum.accumulate(wanted + steepest * along) - steepest * along
-        after = np.maximum.accumulate((wanted - steepest * along)[::-1])[::-1] + steepest * along
-        wanted = np.maximum(before, after)
+        wanted = no_steeper(wanted, along, steepest)
     up = min(TOLERANCE, max(most_above - above, 0.0))
     kept = _thinned(
         along, np.fmin(np.fmax(wanted - TOLERANCE, clear), wanted), wanted, wanted + up, corner >= 0
