@@ -18,14 +18,9 @@ from scipy.stats import chi2
 import wildlab
 from tests.rooms import LAZY
 from wildlab import paths
-from wildlab.analysis.navigate import (
-    PUBLISHED_LIKE,
-    Series,
-    mean_of_runs,
-    worth,
-)
+from wildlab.analysis.navigate import PUBLISHED_LIKE
 from wildlab.api.flights import Points
-from wildlab.evaluation.consistency import chi_square_interval
+from wildlab.evaluation.consistency import Series, chi_square_interval, mean_of_runs, worth
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.simulation.twins import simulate_twin

@@ -13,8 +13,8 @@ import pytest
 from click.testing import CliRunner
 from scipy.spatial.transform import Rotation
 
+from wildlab.analysis.accuracy import used_deviations
 from wildlab.analysis.georeference import observe
-from wildlab.analysis.pose_noise import used_deviations
 from wildlab.cli import wildlab
 from wildlab.flight.store import load_flight
 

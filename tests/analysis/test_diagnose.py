@@ -288,7 +288,7 @@ def test_a_clock_shows_without_a_known_place():
 @pytest.mark.slow
 def test_a_calibration_has_what_sightings_say():
     _, seen, found = unknown(0.3)
-    learnt = learn_from(seen, found.diagnosis, np.random.default_rng(0))
+    learnt = learn_from(seen, found.diagnosis)
     assert [one.name for one in learnt.parameter] == ["clock"]
     assert learnt.parameter[0].low <= 0.3 <= learnt.parameter[0].high
 

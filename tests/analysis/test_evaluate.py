@@ -13,7 +13,6 @@ from wildlab.analysis.evaluate import (
     recorded_answers,
 )
 from wildlab.analysis.georeference import observe, pose_errors
-from wildlab.analysis.pose_noise import estimate_noise
 from wildlab.flight.clocks import covariance_columns
 from wildlab.geometry.frames import (
     euler_to_matrix,
@@ -37,12 +36,6 @@ def test_a_clock_offset_shows_and_the_manifest_s_offset_takes_it_off(make_flight
     assert score(flight)["error_m"].mean() > 4.0
     assert score(flight, observe(flight, clock_shift=0.5))["error_m"].max() < 1e-6
     assert score(changed(flight, {"clocks": {"camera_offset_s": 0.5}}))["error_m"].max() < 1e-6
-
-
-def test_the_noise_of_poses_is_found_from_known_points(make_flight):
-    flight = make_flight(n_images=150, attitude_deg=0.3, position_m=0.3, pixel_px=2.0)
-    found = estimate_noise(observe(flight), score(flight))
-    assert found.sd["tilt"] == pytest.approx(np.radians(0.3), rel=0.35)
 
 
 def test_a_log_s_own_covariance_is_used_and_can_be_overridden(make_flight):

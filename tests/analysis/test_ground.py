@@ -9,8 +9,7 @@ import pandas as pd
 from scipy.ndimage import gaussian_filter
 
 from tests.analysis.building import manifest_of, poses_table, surveyed
-from wildlab.analysis.georeference import georeference, observe
-from wildlab.analysis.ground import on_level, shift_from_level
+from wildlab.analysis.georeference import georeference, observe, on_level, shift_from_level
 from wildlab.analysis.tracks.pixels import read_pixels
 from wildlab.flight.checks.check import check_flight
 from wildlab.flight.store import Flight

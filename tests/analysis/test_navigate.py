@@ -10,8 +10,7 @@ import pytest
 
 from tests.analysis.conftest import changed, first_seconds
 from tests.refused import refused
-from wildlab.analysis.navigate import navigate_mekf, navigate_observer
-from wildlab.analysis.navigation_inputs import imu_noise
+from wildlab.analysis.navigate import imu_noise, navigate_mekf, navigate_observer
 from wildlab.flight.clocks import poses_at
 from wildlab.flight.manifest import ImuPart
 from wildlab.flight.schema import COVARIANCE_COLUMNS, LEVER_COLUMNS, SECOND_COLUMNS

@@ -11,11 +11,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from wildlab.analysis.navigate import (
     Navigated,
-    corrections,
-    navigate_all,
     navigate_mekf,
 )
 from wildlab.flight.clocks import covariances, poses_at
@@ -28,6 +27,7 @@ from wildlab.geometry.frames import (
     wrap,
 )
 from wildlab.paths import DATA
+from wildlab.studies.navigation import navigate_all
 
 #: In the air, by speed and height.
 THOR_AIRBORNE = (212.0, 579.0)
@@ -68,6 +68,22 @@ def euler_deviations(found: Navigated, begin: float, end: float) -> np.ndarray:
     to_euler = wrap(np.stack(near, axis=-1) - matrix_to_euler(R)[..., None]) / h
     spread = np.einsum("kij,kjl,kil->ki", to_euler, P[:, 3:, 3:], to_euler)
     return np.degrees(np.sqrt(spread)).mean(axis=0)
+
+
+def corrections(flight: Flight, found: Navigated) -> np.ndarray:
+    """What turned the estimate from one row to the next besides the gyros, rad, (M - 1,).
+
+    Zero but for what measurements correct. Meant for estimates at all inertial samples: across the vertical,
+    where Euler angles jump, this does not.
+    """
+    imu, times = flight.table("imu"), found.nav["time_s"].to_numpy(float)
+    rows = np.searchsorted(imu["time_s"].to_numpy(float), times)
+    rate = imu[[f"w_{axis}_rad_s" for axis in "xyz"]].to_numpy(float)[rows]
+    bias = found.biases[[f"gyro_{axis}_rad_s" for axis in "xyz"]].to_numpy(float)
+    felt = (rate[1:] + rate[:-1]) / 2 - bias[1:]
+    attitude = Rotation.from_quat(found.nav[["q_w", "q_x", "q_y", "q_z"]].to_numpy(float), scalar_first=True)
+    turned = (attitude[:-1].inv() * attitude[1:]).as_rotvec()
+    return np.linalg.norm(turned - felt * np.diff(times)[:, None], axis=1)
 
 
 def rms(values: np.ndarray) -> np.ndarray:

@@ -11,22 +11,24 @@ from tests.analysis.conftest import first_seconds
 from wildlab.analysis.navigate import (
     AXES,
     PUBLISHED_LIKE,
+    VELOCITY,
     comparison_times,
     errors_against,
     navigate_mekf,
-    normalised_innovations,
-    numbers_of,
-    shares_within,
-    study_navigation,
     summarise,
-    summarise_innovations,
-    unit_of,
 )
-from wildlab.analysis.navigation_inputs import VELOCITY
 from wildlab.flight.clocks import covariance_columns
 from wildlab.flight.store import Flight
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.twins import simulate
+from wildlab.studies.navigation import (
+    normalised_innovations,
+    numbers_of,
+    shares_within,
+    study_navigation,
+    summarise_innovations,
+    unit_of,
+)
 
 
 def table(times: np.ndarray, attitude: Rotation, p: np.ndarray, v: np.ndarray) -> pd.DataFrame:

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wildlab.analysis.georeference import covariances_of, georeference, observe
-from wildlab.analysis.ground import CORNERS, write_points
+from wildlab.analysis.georeference import CORNERS, covariances_of, georeference, observe, write_points
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import geodetic_to_ned
 from wildlab.simulation.twins import simulate_twin

@@ -12,7 +12,7 @@ import pytest
 import wildlab
 from tests.analysis.robots import KNOWN, joined, robot_flight
 from wildlab.analysis.georeference import assumed_deviations, assumed_pose_covariance
-from wildlab.analysis.navigate import PUBLISHED_LIKE, Navigated, Series
+from wildlab.analysis.navigate import PUBLISHED_LIKE, Navigated
 from wildlab.analysis.tracks import tracker
 from wildlab.analysis.tracks.pixels import (
     FILTERS,
@@ -26,7 +26,7 @@ from wildlab.analysis.tracks.scores import STATE, estimates_table, score_tracks
 from wildlab.analysis.tracks.single_target import TOGETHER
 from wildlab.api import tracks
 from wildlab.api.tracks import FEW_INDEPENDENT, Consistency
-from wildlab.evaluation.consistency import Average, chi_square_interval
+from wildlab.evaluation.consistency import Average, Series, chi_square_interval
 from wildlab.flight.clocks import poses_at
 from wildlab.flight.files import check_model
 from wildlab.flight.manifest import Settings, parse_settings

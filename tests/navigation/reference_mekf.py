@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import block_diag, expm
+from scipy.linalg import block_diag
 from scipy.spatial.transform import Rotation
 
 from wildlab.geometry.frames import Array, skew
@@ -61,20 +61,13 @@ def process_noise(dt: float, q_v: float, q_a: float, drive_a: float, drive_g: fl
 
 
 def carry_errors(extra: Array, dt: float) -> tuple[Array, Array]:
-    """Transition and noise of the errors beyond the fifteen, each (m, m), over dt: by the matrix exponential.
+    """Transition and noise of the errors beyond the fifteen, each (m, m), over dt.
 
-    ``extra`` (m, 3) as `mekf.MekfInputs` has it. What the noise puts back is what stationary errors lose.
+    ``extra`` (m, 2) as `mekf.MekfInputs` has it. What the noise puts back is what stationary errors lose.
     """
-    A, C = np.diag(-1 / extra[:, 1]), np.zeros((len(extra), len(extra)))
-    bounded = np.isfinite(extra[:, 1])
-    C[bounded, bounded] = extra[bounded, 0] ** 2 * extra[bounded, 1] / 2
-    for i in np.flatnonzero(extra[:, 2] > 0):
-        rate = i + int(extra[i, 2])
-        A[i, rate] = 1.0
-        C[i, rate] = C[rate, i] = C[rate, rate] / (1 / extra[i, 1] + 1 / extra[rate, 1])
-        C[i, i] = extra[i, 1] * C[i, rate]
-    Phi = expm(A * dt)
-    return Phi, C - Phi @ C @ Phi.T
+    kept = np.exp(-dt / extra[:, 1])
+    stationary = np.where(np.isfinite(extra[:, 1]), extra[:, 0] ** 2 * extra[:, 1] / 2, 0.0)
+    return np.diag(kept), np.diag(stationary * (1 - kept**2))
 
 
 def predict_measurement(kind: int, x: Array, w: Array, value: Array, lever: Array) -> tuple[Array, Array]:

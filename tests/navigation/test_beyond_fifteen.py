@@ -34,7 +34,7 @@ def test_compiled_and_reference_agree_on_axes_and_gauss_markov_errors(flight):
     imu, start, antennas, _ = spoilt(flight, 0, every=50)
     keep = (imu.times < 30) & ~((imu.times > 20.0) & (imu.times < 21.3))
     imu = ImuSamples(*(part[keep] for part in imu))
-    correlated = antennas[1]._replace(gauss_markov=GaussMarkov(np.array([0.1, 0.2, 0.3]), 15.0, 2.0))
+    correlated = antennas[1]._replace(gauss_markov=GaussMarkov(np.array([0.1, 0.2, 0.3]), 15.0))
     seconds = np.arange(1.0, 29)
     moving = velocities(seconds, moved(seconds)[0], 0.5)
     moving = moving._replace(gauss_markov=GaussMarkov(np.array([0.2, 0.2, 0.4]), 3.0))
@@ -43,7 +43,7 @@ def test_compiled_and_reference_agree_on_axes_and_gauss_markov_errors(flight):
     wanted = np.arange(0.5, 29.5, 1.0)
     found = run_mekf(imu, start, NOISE, earth, aiding, wanted, axes=axes)
     ready = prepare(imu, start, NOISE, aiding, wanted, 0.9999, Outages(), axes)
-    beyond = 18 + 6 + 3
+    beyond = 18 + 3 + 3
     assert ready.covariance.shape == (15 + beyond, 15 + beyond)
     states, covariances, nis, verdicts = reference_mekf.mekf(ready, earth.as_array(), 5.0)
     known = np.isfinite(found.position).all(axis=1)

@@ -55,7 +55,9 @@ def diagnosis(winner, *others, outliers=(), alike=(), rivals=(), out=0):
     names = winner.fit.names
     told = Calibration(names, np.ones(len(names)), 0.01 * np.eye(len(names)), {}, 4, 4, 10)
     scored = pd.DataFrame({"frame_id": np.arange(20)})
-    return Diagnosis(scored, np.zeros(20, int), models, ranked, told, alike, outliers, np.arange(20) >= out)
+    return Diagnosis(
+        scored, np.zeros(20, int), models, ranked, told, alike, outliers, np.arange(20) >= out, (), None
+    )
 
 
 def ellipses(word, factor=1.0, low=0.9, high=1.1):

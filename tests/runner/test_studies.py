@@ -13,7 +13,6 @@ import pytest
 
 from tests.page_words import MOST_IN_ANSWER, MOST_WORDS, words_in_sight
 from tests.studies.claims import checks_of
-from wildlab.analysis.navigate import TUNINGS
 from wildlab.evaluation.consistency import white_bound
 from wildlab.flight.recipe.importing import import_flight
 from wildlab.paths import DATA
@@ -22,6 +21,7 @@ from wildlab.runner.catalogue import StudyEntry, load_studies
 from wildlab.runner.evaluate import evaluate_flight
 from wildlab.runner.run import run_studies
 from wildlab.sharing.document import read_part
+from wildlab.studies.navigation import TUNINGS
 from wildlab.studies.printed_numbers import all_pairs
 from wildlab.studies.protocol import run_trial, split_keys
 

@@ -13,9 +13,9 @@ import pytest
 from matplotlib.figure import Figure
 
 from tests.flight.conftest import make_flight  # noqa: F401 - a fixture
-from wildlab.analysis.navigate import Studied
 from wildlab.flight.store import Flight
 from wildlab.studies import navigation
+from wildlab.studies.navigation import Studied
 
 
 def level_nav(times: np.ndarray) -> pd.DataFrame:

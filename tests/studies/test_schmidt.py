@@ -5,10 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wildlab.analysis.pose_noise import covariance_of, pauses
 from wildlab.analysis.tracks.pixels import PixelMeasurements, track_schmidt
 from wildlab.errors import WildlabError
-from wildlab.evaluation.pose_noise import KINDS, PoseNoise
 from wildlab.flight.store import Flight
 from wildlab.simulation.twins import simulate_twin
 from wildlab.studies.schmidt import (
@@ -34,13 +32,14 @@ from wildlab.studies.schmidt import (
     first_part,
     navigated_sighting,
     only,
+    pauses,
     scaled,
     sheet_sighting,
     trial,
 )
 from wildlab.tracking.run import Track
 
-NOISE = PoseNoise(dict(zip(KINDS, (0.5, 0.8, 0.02, 0.05, 3.0), strict=True)), dict.fromkeys(KINDS, 1.1))
+OTHER = np.diag(np.square([0.5, 0.5, 0.8, 0.02, 0.02, 0.05]))
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +54,7 @@ def seen(flight: Flight) -> PixelMeasurements:
 
 @pytest.fixture(scope="module")
 def tracks(flight: Flight, seen: PixelMeasurements) -> dict[str, Track]:
-    return compare(seen, sheet_sighting(flight), NOISE)
+    return compare(seen, sheet_sighting(flight), OTHER)
 
 
 def test_the_other_block_is_zero_and_this_one_kept():
@@ -85,7 +84,7 @@ def test_what_each_filter_is_told(tracks, seen):
     alone = {
         "schmidt": P,
         "schmidt-x0.3": 0.09 * P,
-        "schmidt-estimated": np.tile(covariance_of(NOISE), (len(P), 1, 1)),
+        "schmidt-estimated": np.tile(OTHER, (len(P), 1, 1)),
         "schmidt-1.5-deg-5-m": np.tile(np.diag([25.0] * 3 + [np.radians(1.5) ** 2] * 3), (len(P), 1, 1)),
     }
     for who, covariance in alone.items():
@@ -95,10 +94,6 @@ def test_what_each_filter_is_told(tracks, seen):
     sizes = [np.linalg.det(tracks[scaled(factor)].P[-1, :2, :2]) for factor in FACTORS]
     assert (np.diff(sizes) > 0).all()
     assert scaled(1) == "schmidt" and len(CURVE) == len(FACTORS)
-
-
-def test_an_estimated_covariance_is_that_of_position_and_attitude():
-    assert np.sqrt(np.diag(covariance_of(NOISE))).tolist() == pytest.approx([0.5, 0.5, 0.8, 0.02, 0.02, 0.05])
 
 
 def test_a_part_of_a_flight_ends_its_sensors_and_leaves_the_rest(flight):
@@ -113,7 +108,7 @@ def test_a_part_of_a_flight_ends_its_sensors_and_leaves_the_rest(flight):
 def test_poses_without_covariance_are_refused(seen):
     bare = seen._replace(poses=replace(seen.poses, covariance=None))
     with pytest.raises(WildlabError, match="no covariance"):
-        compare(bare, seen, NOISE)
+        compare(bare, seen, OTHER)
 
 
 def test_a_logged_flight_is_refused(flight):

@@ -5,7 +5,6 @@ import pandas as pd
 import pytest
 
 from tests.studies.claims import checks_of
-from wildlab.analysis.rendered import judge
 from wildlab.detection.floating import FloatingObjects, FloatingThresholds, find_objects
 from wildlab.evaluation.intervals import share_interval
 from wildlab.evaluation.shares import FAILS, HOLDS, UNDECIDED, decide_check
@@ -21,6 +20,7 @@ from wildlab.studies.vessel_detection import (
     SHIP,
     WHOLE,
     Image,
+    judge,
     numbers_of,
     tally,
     trial,

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from wildlab.analysis import Fact, fact
-from wildlab.analysis.diagnose import FEWEST_IMAGES, Diagnosis, count_images, diagnose
+from wildlab.analysis.diagnose import FEWEST_IMAGES, Diagnosis, diagnose
 from wildlab.analysis.evaluate import (
     axes_of,
     blocks_of,
@@ -21,20 +21,17 @@ from wildlab.analysis.evaluate import (
 )
 from wildlab.analysis.georeference import (
     Observations,
+    assumed_deviations,
     calibrated,
     covariances_of,
     georeference,
     observe,
     pose_errors,
 )
-from wildlab.analysis.pose_noise import (
-    as_deviations,
-    estimate_noise,
-    used_deviations,
-)
 from wildlab.analysis.verdict import FEW_POINTS
 from wildlab.errors import WildlabError
 from wildlab.evaluation.causes import mean_of_others
+from wildlab.evaluation.correlated_errors import WanderNoise
 from wildlab.evaluation.ellipses import (
     EllipseVerdict,
     Spread,
@@ -51,7 +48,6 @@ from wildlab.evaluation.errors import (
     summarise,
 )
 from wildlab.evaluation.intervals import Halves, Labels, compare_halves
-from wildlab.evaluation.pose_noise import PoseNoise
 from wildlab.flight.calibration_files import (
     UNITS,
     Conditions,
@@ -64,6 +60,7 @@ from wildlab.flight.calibration_files import (
 )
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
+from wildlab.geometry.attitude_uncertainty import tilt_and_heading
 from wildlab.geometry.corrections import Calibration, apply_calibration, calibrated_camera
 from wildlab.geometry.frames import Array, euler_to_matrix, matrix_to_quaternion, quaternion_to_matrix
 
@@ -113,7 +110,7 @@ class Accuracy:
     halves: Halves
     diagnosis: Diagnosis | None
     remaining: Scatter
-    noise: PoseNoise | None
+    noise: WanderNoise | None
     visible_m: float
 
     @property
@@ -173,9 +170,6 @@ def judge_accuracy(
         left, of = errors_of(diagnosis.scored), diagnosis.scored
     if diagnosis is not None:
         left, of = left[diagnosis.inliers], of[diagnosis.inliers]
-    noise = None
-    if diagnosis is not None and count_images(diagnosis.scored, diagnosis.inliers) >= FEWEST_IMAGES:
-        noise = noise_without(observations, diagnosis, rng)
     by_nearest = flight.manifest.scoring.rule == "nearest"
     return Accuracy(
         observations=observations,
@@ -191,34 +185,50 @@ def judge_accuracy(
         halves=compare_halves(scored["error_m"].to_numpy(float), blocks),
         diagnosis=diagnosis,
         remaining=scatter_by_image(left, of["frame_id"]),
-        noise=noise,
+        noise=None if diagnosis is None else diagnosis.noise,
         visible_m=visible_error(flight, scored) if by_nearest else np.nan,
     )
 
 
-def noise_without(observations: Observations, diagnosis: Diagnosis, rng: np.random.Generator) -> PoseNoise:
-    """Noise of the poses with the winner's constants taken off, and without what is far out.
-
-    Whether the winner is certain does not matter: what stays the same in all images is no noise, whichever
-    cause it has, and left in it would be booked as noise of whatever resembles it.
+def used_deviations(observations: Observations, assumed: dict[str, float] | None = None) -> dict[str, float]:
+    """The standard deviations that the ellipses of observations really come from.
 
     Parameters
     ----------
-    observations, rng
-        As for `judge_accuracy`.
-    diagnosis
-        Of these observations.
+    observations
+        From `observe`.
+    assumed
+        As for `pose_errors`: takes the place of what the log and the manifest state.
 
     Returns
     -------
-    PoseNoise
+    dict
+        By the names of ``USUAL``: those of the poses are the log's own where it has a covariance (root of the
+        mean variance), otherwise the manifest's or the usual ones.
     """
-    known = diagnosis.scored[diagnosis.inliers].reset_index(drop=True)
-    placed = observations
-    if diagnosis.winner.causes:
-        placed = calibrated(observations, diagnosis.calibration)
-        known = score_points(placed.flight, georeference(placed.of(known), rng))
-    return estimate_noise(placed, known)
+    sd = assumed_deviations(observations.flight) | (assumed or {})
+    covariance = observations.poses.covariance
+    if covariance is None or assumed is not None or not np.isfinite(covariance).any():
+        return sd
+    own = np.sqrt(np.nanmean(np.diagonal(covariance, axis1=1, axis2=2), axis=0))
+    tilt, heading = tilt_and_heading(covariance[:, 3:, 3:], observations.poses.R_nb)
+    return sd | {
+        "position_horizontal_m": float(np.sqrt((own[:2] ** 2).mean())),
+        "position_vertical_m": float(own[2]),
+        "tilt_deg": float(np.degrees(np.sqrt(np.nanmean(tilt**2)))),
+        "heading_deg": float(np.degrees(np.sqrt(np.nanmean(heading**2)))),
+    }
+
+
+def as_deviations(noise: WanderNoise) -> dict[str, float]:
+    """Estimated deviations under the names that ``pose_errors`` takes."""
+    return {
+        "position_horizontal_m": noise.sd["position_horizontal"],
+        "position_vertical_m": noise.sd["position_vertical"],
+        "tilt_deg": float(np.degrees(noise.sd["tilt"])),
+        "heading_deg": float(np.degrees(noise.sd["heading"])),
+        "pixel_px": noise.sd["pixel"],
+    }
 
 
 class Repeats(NamedTuple):
@@ -360,10 +370,10 @@ def learn_flight(
     known = flight.truth is not None
     scored = score_points(flight, points) if known else compare_sightings(points)
     diagnosis = diagnose(observations, scored, places_known=known)
-    return learn_from(observations, diagnosis, rng), diagnosis
+    return learn_from(observations, diagnosis), diagnosis
 
 
-def learn_from(observations: Observations, diagnosis: Diagnosis, rng: np.random.Generator) -> Learnt:
+def learn_from(observations: Observations, diagnosis: Diagnosis) -> Learnt:
     """What a diagnosis teaches: corrections only where they gained something for certain.
 
     Parameters
@@ -372,8 +382,6 @@ def learn_from(observations: Observations, diagnosis: Diagnosis, rng: np.random.
         As `diagnose` had them.
     diagnosis
         Of it.
-    rng
-        Draws samples of flat rays.
 
     Returns
     -------
@@ -399,8 +407,6 @@ def learn_from(observations: Observations, diagnosis: Diagnosis, rng: np.random.
         )
         scales.append(scale)
     covariance = calibration.covariance * np.outer(scales, scales) if scales else np.zeros((0, 0))
-    learnt = diagnosis.noise if diagnosis.noise is not None and not diagnosis.places_known else None
-    noise = as_deviations(learnt or noise_without(observations, diagnosis, rng))
     return Learnt(
         learnt_on=LearntOn(
             flight=flight.name,
@@ -413,7 +419,7 @@ def learn_from(observations: Observations, diagnosis: Diagnosis, rng: np.random.
         conditions=Conditions(height_m=_range(height), depression_deg=_range(depression)),
         camera=camera,
         mount=flight.manifest.mount,
-        noise=LearntNoise(**noise),
+        noise=LearntNoise(**as_deviations(diagnosis.noise)),
         gain=LearntGain(
             without_m=gain.without,
             with_m=gain.with_,

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from wildlab.analysis import Fact, fact
 from wildlab.analysis.evaluate import blocks_of
-from wildlab.analysis.flow import Reading, camera_poses_at
-from wildlab.analysis.georeference import truth_of
+from wildlab.analysis.georeference import camera_poses_at, truth_of
 from wildlab.detection.flow import as_grey, image_motion
 from wildlab.errors import WildlabError
 from wildlab.flight.clocks import frame_times
@@ -101,7 +100,7 @@ def camera_clock_by_points(flight: Flight, source: str | None = None) -> ClockBy
     table = pd.DataFrame({"target_id": pixels["target_id"].to_numpy(object), "frame_id": pixels["frame_id"]})
 
     def seen_at(offset: float) -> tuple[CameraPoses, Array]:
-        poses = camera_poses_at(flight, times + offset, Reading(source=source))
+        poses = camera_poses_at(flight, times + offset, source)
         if "pan_rad" in frames:
             angles = {name: frames[f"{name}_rad"].to_numpy(float)[at] for name in ("pan", "tilt")}
             poses = replace(poses, **angles)
@@ -212,7 +211,7 @@ def _camera_motion(flight: Flight, source: str | None) -> tuple[Array, Array, Ar
     """Times (T,), and integrals (T, 3) of the camera's angular velocity in c and of what its travel shows."""
     _, nav = flight.pose_source(source)
     t = nav["time_s"].to_numpy(float)
-    poses = camera_poses_at(flight, t, Reading(source=source))
+    poses = camera_poses_at(flight, t, source)
     good = np.isfinite(poses.p_nc).all(axis=1) & np.isfinite(poses.R_nc).all(axis=(1, 2))
     t, p, R = t[good], poses.p_nc[good], poses.R_nc[good]
     if len(t) < 2:

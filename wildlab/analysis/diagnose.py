@@ -181,8 +181,8 @@ class Diagnosis:
     alike: tuple[tuple[str, str], ...]
     outliers: tuple[Outlier, ...]
     inliers: Mask
-    implausible: tuple[Model, ...] = ()
-    noise: WanderNoise | None = None
+    implausible: tuple[Model, ...]
+    noise: WanderNoise
     places_known: bool = True
     extended: bool = False
     misfit: bool = False

@@ -1,55 +1,300 @@
-"""A flight's inertial samples and satellite positions as poses: one more ``nav`` table."""
+"""A flight's inertial samples and satellite positions as poses: one more ``nav`` table, and its errors."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from wildlab.analysis.navigation_inputs import (
-    POSITION,
-    VELOCITY,
-    Receiver,
-    axis_errors,
-    filter_of,
-    heading_from,
-    imu_noise,
-    inputs_of,
-    receiver_noise,
-    second_vector,
-    told,
-    without_gross,
-)
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import (
-    Average,
-    autocorrelation,
-    average,
-    chi_square_interval,
-    effective_sample_size,
     nees,
-    share_inside,
-    white_bound,
 )
 from wildlab.flight.checks.inertial import FLYING
 from wildlab.flight.clocks import covariance_columns, covariances, frame_times, gnss_times, poses_at
+from wildlab.flight.schema import LEVER_COLUMNS, SECOND_COLUMNS
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
-from wildlab.navigation.mekf import pose_covariance, signs_of_trouble
-from wildlab.navigation.observer import Gains, run_observer
-from wildlab.navigation.receiver import ReceiverNoise
+from wildlab.geometry.gravity import local_earth
+from wildlab.navigation.aiding import Aiding, positions, velocities
+from wildlab.navigation.alignment import align_at_rest, align_from_baseline, align_from_course, find_rest
+from wildlab.navigation.magnetometer import earth_field, hard_iron, share_turned
+from wildlab.navigation.mekf import InitialState, pose_covariance, run_mekf, signs_of_trouble
+from wildlab.navigation.noise import AxisErrors, ImuNoise, with_turn_on
+from wildlab.navigation.observer import (
+    Gains,
+    baseline_reference,
+    course_reference,
+    field_reference,
+    run_observer,
+)
+from wildlab.navigation.strapdown import ImuSamples
+
+POSITION = ["north_m", "east_m", "down_m"]
+VELOCITY = ["v_north_m_s", "v_east_m_s", "v_down_m_s"]
+FIELD = ("field_x_ut", "field_y_ut", "field_z_ut")
+#: Share of the magnetic field's turning that gyros in the same axes explain at least; it is nearer one.
+TURNED = 0.6
+#: How much wider than the fixes behind it the heading at the start is taken to be.
+LOOSE = 5.0
+
+
+#: See `heading_from`.
+Heading = Literal["antennas", "field", "course"]
+
+
+class Inputs(NamedTuple):
+    """Samples, aiding by what it is called in a report, and the start."""
+
+    imu: ImuSamples
+    aiding: dict[str, Aiding]
+    start: InitialState
+
+
+def imu_noise(flight: Flight) -> ImuNoise:
+    """How the flight's inertial sensor errs, from ``[imu]`` of the manifest, with its biases at switching on.
+
+    Raises
+    ------
+    WildlabError
+        Where one of the figures is not stated there.
+    """
+    stated = flight.manifest.imu
+    hour = 3600.0
+    figures = {
+        "velocity_random_walk_m_s_sqrt_h": 1 / np.sqrt(hour),
+        "angle_random_walk_deg_sqrt_h": np.radians(1.0) / np.sqrt(hour),
+        "accelerometer_bias_m_s2": 1.0,
+        "accelerometer_bias_time_s": 1.0,
+        "gyro_bias_deg_h": np.radians(1.0) / hour,
+        "gyro_bias_time_s": 1.0,
+    }
+    missing = stated.unstated_noise()
+    if missing:
+        raise WildlabError(
+            f"how the inertial sensor errs is not stated ({missing[0]} and {len(missing) - 1} more)"
+            if len(missing) > 1
+            else f"how the inertial sensor errs is not stated ({missing[0]})",
+            "take the figures from its data sheet, or from the log's own standstill",
+            file=flight.folder,
+            field=f"imu.{missing[0]}",
+        )
+    noise = ImuNoise(*(float(getattr(stated, name)) * scale for name, scale in figures.items()))
+    gyro = np.radians(stated.gyro_turn_on_deg_h or 0.0) / hour
+    return with_turn_on(noise, stated.accelerometer_turn_on_m_s2 or 0.0, float(gyro))
+
+
+def axis_errors(flight: Flight) -> AxisErrors | None:
+    """How far the inertial sensor's axes may be off, from ``[imu]`` of the manifest, where it says so.
+
+    Stated are limits; anything up to them counts as equally likely.
+    """
+    stated = flight.manifest.imu
+    limits = (
+        np.radians(stated.misalignment_deg or 0.0),
+        np.radians(stated.axis_misalignment_deg or 0.0),
+        (stated.scale_error_percent or 0.0) / 100,
+    )
+    return AxisErrors(*(float(limit / np.sqrt(3)) for limit in limits)) if any(limits) else None
+
+
+def inputs_of(
+    flight: Flight,
+    *,
+    velocity: bool = True,
+    noise: ImuNoise | None = None,
+    position_sd: tuple[float, float] | None = None,
+    accelerometer_bias: ArrayLike = (0.0, 0.0, 0.0),
+) -> Inputs:
+    """What both filters need of a flight.
+
+    Parameters
+    ----------
+    velocity
+        Whether to use GNSS velocities where the flight has them.
+    noise
+        As `imu_noise` gives it: says how far biases at the start may be off, where the manifest states that.
+    position_sd
+        Of each level axis and of the height, m, in place of what is stated; positions then count as white.
+    accelerometer_bias
+        (3,) m/s^2, taken off what the accelerometers measured.
+
+    Raises
+    ------
+    WildlabError
+        Where the flight lacks inertial samples, satellite positions, or what is known of their errors.
+    """
+    gnss, samples = flight.table("gnss"), samples_of(flight)
+    off = np.asarray(accelerometer_bias, float)
+    samples = samples._replace(specific_force=samples.specific_force - off)
+    t, p = gnss_times(flight), gnss[POSITION].to_numpy(float)
+    sd = _position_sd(flight, gnss)
+    spread = float(np.sqrt(2) * np.nanmedian(sd))
+    wander, wander_time = _wander(flight)
+    if position_sd is not None:
+        wander = np.zeros(3)
+        sd = np.tile([position_sd[0], position_sd[0], position_sd[1]], (len(t), 1))
+    white = np.sqrt(np.maximum(sd**2 - wander**2, (0.01 * sd) ** 2))
+    arms = _levers(flight, gnss)
+    aiding = {"position": positions(t, p, white, arms[0], 0.0, wander, wander_time)}
+    moving = set(VELOCITY) <= set(gnss.columns)
+    v = _velocities(gnss, t)
+    spread_v = _velocity_sd(flight, gnss)
+    if velocity and moving and spread_v is not None:
+        aiding["velocity"] = velocities(t, v, spread_v, arms[0])
+    gravity = local_earth(flight.manifest.origin_tuple()[0], flight.manifest.origin_tuple()[2]).gravity
+    known: dict[str, float] = {}
+    if noise is not None:  # where nobody says what biases are at switching on, they may be anything usual
+        if flight.manifest.imu.accelerometer_turn_on_m_s2 is not None:
+            known["accelerometer_bias_sd"] = noise.accelerometer_bias_sd
+        if flight.manifest.imu.gyro_turn_on_deg_h is not None:
+            known["gyro_bias_sd"] = noise.gyro_bias_sd
+    if set(SECOND_COLUMNS) <= set(gnss.columns):
+        second = gnss[list(SECOND_COLUMNS)].to_numpy(float)
+        aiding["second position"] = positions(t, second, white, arms[1], 0.0, wander, wander_time)
+        # The fixes that it starts from are taken in once more: loosely here, so that they count once.
+        known["baseline_sd"] = LOOSE * spread
+        start = align_from_baseline(samples, t, p, second, *arms, gravity=gravity, **known)
+    else:
+        rest = find_rest(samples, t, v) if moving else None
+        if rest is None:
+            start = align_from_course(samples, t, p, v, gravity=gravity, **known)
+        else:
+            start = align_at_rest(samples, t, p, v, rest=rest, gravity=gravity, min_speed=FLYING, **known)
+    return Inputs(samples, aiding, start)
+
+
+def _position_sd(flight: Flight, gnss: pd.DataFrame) -> Array:
+    """(N, 3) from the log, else from the manifest's ``[uncertainty]``."""
+    sds = []
+    for column, stated in (
+        ("sd_horizontal_m", flight.manifest.uncertainty.position_horizontal_m),
+        ("sd_vertical_m", flight.manifest.uncertainty.position_vertical_m),
+    ):
+        known = gnss[column].to_numpy(float) if column in gnss else np.full(len(gnss), np.nan)
+        known = np.where(known > 0, known, np.nan if stated is None else stated)
+        if not np.isfinite(known).any():
+            raise WildlabError(
+                "how uncertain the satellite positions are is not stated",
+                f"add the column {column}, or [uncertainty] position_horizontal_m and position_vertical_m",
+                file=flight.folder,
+                field=f"gnss.{column}",
+            )
+        sds.append(np.where(np.isnan(known), np.nanmax(known), known))
+    return np.stack([sds[0], sds[0], sds[1]], axis=-1)
+
+
+def _wander(flight: Flight) -> tuple[Array, float]:
+    """The part of a position's deviation that fixes share (3,) m, and for how long, s; from the manifest."""
+    stated = flight.manifest.gnss
+    if stated.wander_time_s is None:
+        return np.zeros(3), np.inf
+    level, vertical = stated.wander_horizontal_m or 0.0, stated.wander_vertical_m or 0.0
+    return np.array([level, level, vertical]), stated.wander_time_s
+
+
+def _velocity_sd(flight: Flight, gnss: pd.DataFrame) -> Array | None:
+    """(N, 1) from the log, else (3,) from the manifest's ``[uncertainty]``; None if neither says."""
+    if "sd_velocity_m_s" in gnss:
+        return gnss["sd_velocity_m_s"].to_numpy(float)[:, None]
+    stated = flight.manifest.uncertainty
+    level, vertical = stated.velocity_horizontal_m_s, stated.velocity_vertical_m_s
+    return None if level is None or vertical is None else np.array([level, level, vertical])
+
+
+def _velocities(gnss: pd.DataFrame, times: Array) -> Array:
+    """(N, 3) m/s, as logged or else from the positions."""
+    if set(VELOCITY) <= set(gnss.columns):
+        return gnss[VELOCITY].to_numpy(float)
+    return np.gradient(gnss[POSITION].to_numpy(float), times, axis=0)
+
+
+def _levers(flight: Flight, gnss: pd.DataFrame) -> list[Array]:
+    """From b to the first antenna and to the second one, (3,) m in b each."""
+    return [_lever(flight, gnss, LEVER_COLUMNS[:3]), _lever(flight, gnss, LEVER_COLUMNS[3:])]
+
+
+def _lever(flight: Flight, gnss: pd.DataFrame, columns: tuple[str, ...]) -> Array:
+    if set(columns) <= set(gnss.columns):
+        return gnss[list(columns)].iloc[0].to_numpy(float)
+    return np.array(flight.manifest.gnss.lever_arm_m)
+
+
+def samples_of(flight: Flight) -> ImuSamples:
+    """The flight's inertial samples."""
+    imu = flight.table("imu")
+    return ImuSamples(
+        imu["time_s"].to_numpy(float),
+        imu[["f_x_m_s2", "f_y_m_s2", "f_z_m_s2"]].to_numpy(float),
+        imu[["w_x_rad_s", "w_y_rad_s", "w_z_rad_s"]].to_numpy(float),
+    )
+
+
+def heading_from(flight: Flight) -> Heading:
+    """What shows the observer the heading, the best that the flight has: two antennas, the magnetic field
+    where the manifest says how the Earth's lies there, or the course."""
+    stated = flight.manifest.magnetometer
+    if set(SECOND_COLUMNS) <= set(flight.table("gnss").columns):
+        return "antennas"
+    known = None not in (stated.inclination_deg, stated.declination_deg)
+    return "field" if known and "magnetometer" in flight.tables else "course"
+
+
+def second_vector(flight: Flight) -> Aiding:
+    """The observer's second vector, of what `heading_from` names.
+
+    Raises
+    ------
+    WildlabError
+        Where it is the magnetic field, and that cannot be used.
+    """
+    gnss, t, stated = flight.table("gnss"), gnss_times(flight), flight.manifest.magnetometer
+    which = heading_from(flight)
+    if which == "antennas":
+        both = (gnss[columns].to_numpy(float) for columns in (POSITION, list(SECOND_COLUMNS)))
+        return baseline_reference(t, *both, *_levers(flight, gnss))
+    if which == "field":
+        lies = np.radians([stated.declination_deg or 0.0, stated.inclination_deg or 0.0])
+        return field_reference(*_field(flight), earth_field(*lies))
+    return course_reference(t, _velocities(gnss, t), FLYING)
+
+
+def _field(flight: Flight) -> tuple[Array, Array]:
+    """Times (N,) and the field (N, 3) in b, less what is magnetic on board: stated or found in the air.
+
+    Raises
+    ------
+    WildlabError
+        Where the field does not turn as the gyros say: its axes are not those of the inertial samples.
+    """
+    table, gnss = flight.table("magnetometer"), flight.table("gnss")
+    times, field = table["time_s"].to_numpy(float), table[list(FIELD)].to_numpy(float)
+    flown = np.full(len(times), True)
+    if set(VELOCITY) <= set(gnss.columns):
+        t, v = gnss_times(flight), gnss[VELOCITY].to_numpy(float)
+        fast = t[np.hypot(v[:, 0], v[:, 1]) >= FLYING]
+        if len(fast):
+            flown = (times >= fast[0]) & (times <= fast[-1])
+    stated = flight.manifest.magnetometer.hard_iron_ut
+    field = field - (hard_iron(field[flown]) if stated is None else stated)
+    share = share_turned(times[flown], field[flown], samples_of(flight))
+    if share < TURNED:
+        raise WildlabError(
+            f"of the magnetic field's turning in the air, the gyros explain {100 * max(share, 0):.0f} %",
+            "check axes and signs of [magnetometer.field], and that both are on the same clock",
+            file=flight.folder,
+            field="magnetometer",
+        )
+    return times, field
+
 
 BIASES = ["accelerometer_x_m_s2", "accelerometer_y_m_s2", "accelerometer_z_m_s2"] + [
     f"gyro_{axis}_rad_s" for axis in "xyz"
 ]
 
-
-#: Probability that the filter lets a good measurement in.
-GATE = 0.9999
 #: Gain of the observer on a course that stands in for the heading, rad/s. It is off by the crab angle, which
 #: changes sides from one leg to the next: slow enough to see both, half a minute.
 COURSE_GAIN = 1 / 30
@@ -108,22 +353,12 @@ class MekfTuning(NamedTuple):
 #: tracking, on all flights: from hundreds of metres attitudes make the error, and theirs hardly differ.
 PUBLISHED_LIKE = MekfTuning(0.1, 1.2, 0.2, 0.2)
 
-#: The same for H 7.5.4, flight 1: "the IMU was weighted more in the navigation filter", for its turns, and
-#: positions count for little. Printed are 43, 43 and 68 cm and 1.22, 1.24 and 2.63 deg; here come out 43, 43
-#: and 69 cm and 1.20, 1.20 and 2.73 deg.
-PUBLISHED_LIKE_TURNING = MekfTuning(0.38, 0.46, 1.5, 2.9)
-#: The same for flight 2: 87, 87 and 142 cm and 1.73, 1.78 and 2.48 deg printed, 89, 89 and 142 cm and 1.73,
-#: 1.69 and 2.57 deg here. The text does not say that it was tuned otherwise than flight 1; with flight 1's
-#: tuning its deviations come out like those of flight 1.
-PUBLISHED_LIKE_LONG = MekfTuning(0.25, 0.75, 3.6, 8.5)
-
 
 def navigate_mekf(
     flight: Flight,
     times: ArrayLike | None = None,
     *,
     tuning: MekfTuning | None = None,
-    receiver: ReceiverNoise | None = None,
 ) -> Navigated:
     """Poses with covariance by the error-state filter of H 7.3.
 
@@ -142,9 +377,6 @@ def navigate_mekf(
         Noise in place of what the manifest states, for a filter as H has it: fifteen states, white noise, and
         positions only. ``PUBLISHED_LIKE`` gives standard deviations like those of H 7.5.3 and is what the
         tracking of H 7.5.3 and 7.5.4 is to be repeated with.
-    receiver
-        How the receiver errs, in place of what is stated; `receiver_noise` finds it. All fixes are then used
-        but those that no noise explains (`without_gross`): a gate would leave out what this noise is of.
 
     Returns
     -------
@@ -167,11 +399,9 @@ def navigate_mekf(
         noise, axes = noise._replace(velocity_random_walk=walks[0], angle_random_walk=walks[1]), None
     position_sd = None if tuning is None else (tuning.horizontal, tuning.vertical)
     given = inputs_of(flight, velocity=tuning is None, noise=noise, position_sd=position_sd)
-    if receiver is not None:
-        given = given._replace(aiding=told(without_gross(flight, given), receiver))
-    filtered = filter_of(flight, given)._replace(noise=noise, axes=axes)
-    gate = GATE if receiver is None else 1.0
-    found = filtered.run(given.aiding, _wanted(flight, times), gate)
+    latitude, _, height = flight.manifest.origin_tuple()
+    earth, sources = local_earth(latitude, height), list(given.aiding.values())
+    found = run_mekf(given.imu, given.start, noise, earth, sources, _wanted(flight, times), axes=axes)
     nav = _nav_table(found.times, found.position, found.velocity, found.quaternion)
     nav = nav.join(covariance_columns(pose_covariance(found.covariance)))
     bias = np.hstack([found.accelerometer_bias, found.gyro_bias])
@@ -192,7 +422,7 @@ def navigate_mekf(
         | {f"sd_{name}": np.sqrt(what.S[:, i, i]) for i, name in enumerate(("first", "second", "third"))}
     )
     biases = biases.assign(time_s=found.times)
-    signs = tuple(signs_of_trouble(found, list(given.aiding.values())))
+    signs = tuple(signs_of_trouble(found, sources))
     return _known(Navigated(nav, biases, innovations, found.covariance[:, 3:6, 3:6], signs))
 
 
@@ -271,12 +501,6 @@ AXES = ("roll", "pitch", "yaw")
 PLACES = ("north", "east", "down")
 #: Blocks of an error: columns of `NavigationErrors.error`, and what they are called.
 BLOCKS = {"position": slice(0, 3), "velocity": slice(3, 6), "attitude": slice(6, 9)}
-#: The filter with the tunings that are compared with print, by the subject of their numbers.
-TUNINGS = {
-    "mekf-published-like": PUBLISHED_LIKE,
-    "mekf-published-like-turning": PUBLISHED_LIKE_TURNING,
-    "mekf-published-like-long": PUBLISHED_LIKE_LONG,
-}
 
 
 class NavigationErrors(NamedTuple):
@@ -290,23 +514,6 @@ class NavigationErrors(NamedTuple):
     error: Array
     sd: Array
     nees: dict[str, Array]
-
-
-class Studied(NamedTuple):
-    """A flight, navigated and scored at certain times (K,) against one of its nav sources.
-
-    ``receiver`` is how the receiver of a logged flight errs, or None where ``refusal`` says why not. What is
-    judged first is ``mekf``, with what is stated of the sensors: ``mekf-receiver``, where there is one, has a
-    noise that was found on the flight itself.
-    """
-
-    flight: Flight
-    reference: str
-    times: Array
-    found: dict[str, Navigated]
-    scored: dict[str, NavigationErrors]
-    receiver: Receiver | None = None
-    refusal: str = ""
 
 
 def reference_of(flight: Flight) -> str:
@@ -380,7 +587,7 @@ def errors_against(
     error = np.full((len(t), 9), np.nan)
     known = np.isfinite(p[:, 0]) & np.isfinite(p_true[:, 0])
     error[:, :3] = p_true - p
-    error[:, 3:6] = _velocities(reference, t) - _velocities(nav, t)
+    error[:, 3:6] = _nav_velocities(reference, t) - _nav_velocities(nav, t)
     turn = Rotation.from_matrix(np.swapaxes(R[known], 1, 2) @ R_true[known])
     error[known, 6:] = 4 * turn.as_mrp()
     P = np.full((len(t), 9, 9), np.nan)
@@ -397,7 +604,7 @@ def errors_against(
     return NavigationErrors(t, error, np.sqrt(np.diagonal(P, axis1=1, axis2=2)), blocks)
 
 
-def _velocities(nav: pd.DataFrame, times: Array) -> Array:
+def _nav_velocities(nav: pd.DataFrame, times: Array) -> Array:
     if not set(VELOCITY) <= set(nav):
         return np.full((len(times), 3), np.nan)
     stamps = nav["time_s"].to_numpy(float)
@@ -415,15 +622,16 @@ def summarise(errors: NavigationErrors, begin: float = -np.inf, end: float = np.
     part = (errors.times >= begin) & (errors.times < end)
     e, sd = errors.error[part], errors.sd[part]
     result: dict[str, float] = {}
-    for prefix, values in (("rms", _rms(e)), ("mean_sd", _mean(sd))):
+    for prefix, values in (("rms", _rms(e)), ("mean_sd", known_mean(sd))):
         result |= {f"{prefix}_{name}": float(values[i]) for i, name in enumerate(PLACES)}
         result |= {f"{prefix}_{name}": float(np.degrees(values[6 + i])) for i, name in enumerate(AXES)}
     result["rms_velocity"] = float(np.sqrt((_rms(e)[3:6] ** 2).sum()))
-    result |= {f"nees_{name}": float(_mean(values[part])) for name, values in errors.nees.items()}
+    result |= {f"nees_{name}": float(known_mean(values[part])) for name, values in errors.nees.items()}
     return result
 
 
-def _mean(values: Array) -> Array:
+def known_mean(values: Array) -> Array:
+    """Mean over the first axis of what is finite; NaN where nothing is."""
     known = np.isfinite(values)
     total = np.where(known, values, 0.0).sum(axis=0)
     count = known.sum(axis=0)
@@ -431,263 +639,10 @@ def _mean(values: Array) -> Array:
 
 
 def _rms(values: Array) -> Array:
-    return np.sqrt(_mean(values**2))
-
-
-def summarise_innovations(found: Navigated, begin: float = -np.inf, end: float = np.inf) -> pd.DataFrame:
-    """NIS and whiteness of each source's innovations between two times (s), one row for each source.
-
-    Columns: ``source``, ``n``, ``nis`` (mean, ideally 3), ``inside`` (share within the 95 %
-    interval of one), ``left_out`` (share), ``lag1`` (largest autocorrelation of an element of the innovation,
-    in units of what the filter expects of it, at lag 1) and ``bound`` (what white noise stays below).
-    """
-    rows = []
-    stamps = found.innovations["time_s"]
-    inside = found.innovations[(stamps >= begin) & (stamps < end)]
-    for source, part in inside.groupby("source", sort=False):
-        whitened = normalised_innovations(part)
-        rows.append(
-            {
-                "source": source,
-                "n": len(part),
-                "nis": float(part["nis"].mean()),
-                "inside": share_inside(part["nis"], chi_square_interval(3)),
-                "left_out": float((part["verdict"] == 0).mean()),
-                "lag1": max((float(autocorrelation(column, 1)[1]) for column in whitened.T), key=abs),
-                "bound": white_bound(len(part)),
-            }
-        )
-    return pd.DataFrame(rows)
-
-
-def normalised_innovations(innovations: pd.DataFrame) -> Array:
-    """Elements (N, 3) of one source's innovations in units of the deviations that the filter expects."""
-    names = ["first", "second", "third"]
-    expected = innovations[[f"sd_{name}" for name in names]].to_numpy(float)
-    return innovations[names].to_numpy(float) / expected
+    return np.sqrt(known_mean(values**2))
 
 
 def calibrated(flight: Flight) -> bool:
     """Whether the flight's manifest says that its accelerometers are off by no more than `CALIBRATED`."""
     stated = flight.manifest.imu.accelerometer_turn_on_m_s2
     return stated is not None and stated <= CALIBRATED
-
-
-def navigate_all(flight: Flight, times: ArrayLike) -> dict[str, Navigated]:
-    """Every estimate that is compared, by its subject: the filter by what is stated, and the observer; with
-    two antennas also the filter with the tunings of `TUNINGS`.
-
-    The observer of H is for calibrated accelerometers. Where these are not (see `calibrated`), their
-    calibration is the bias that the filter found, the median over the flight.
-    """
-    filtered, off = navigate_mekf(flight, times), np.zeros(3)
-    if not calibrated(flight):
-        off = filtered.biases[BIASES[:3]].median().to_numpy(float)
-    found = {"mekf": filtered, "observer": navigate_observer(flight, times, accelerometer_bias=off)}
-    if "second_north_m" in flight.table("gnss"):
-        found |= {name: navigate_mekf(flight, times, tuning=tuning) for name, tuning in TUNINGS.items()}
-    return found
-
-
-def evaluate_all(
-    flight: Flight, found: Mapping[str, Navigated], times: ArrayLike, reference: str
-) -> dict[str, NavigationErrors]:
-    """Errors of each estimate against the reference, and on a twin those of its autopilot.
-
-    The autopilot is scored by the airframe it sits on, not by the payload with the IMU and the antennas.
-    """
-    table = flight.nav[reference]
-    scored = {
-        name: errors_against(table, one.nav, times, one.velocity_covariance) for name, one in found.items()
-    }
-    if "truth" in flight.nav and "autopilot" in flight.nav:
-        scored["autopilot"] = errors_against(flight.nav["truth"], flight.nav["autopilot"], times)
-    return scored
-
-
-def study_navigation(flight: Flight) -> Studied:
-    """A flight navigated in every way that is compared, and scored by the best reference it has.
-
-    Of a logged flight, whose receiver nobody knows, that one's noise is found as well; a twin states its own.
-
-    Raises
-    ------
-    WildlabError
-        Where it has no reference, or lacks what navigation needs.
-    """
-    reference = reference_of(flight)
-    times = comparison_times(flight, reference)
-    found, receiver, refusal = navigate_all(flight, times), None, ""
-    if flight.manifest.kind == "logged":
-        try:
-            receiver = receiver_noise(flight)
-        except WildlabError as refused:
-            refusal = refused.problem
-        if receiver is not None and receiver.noise is not None:
-            found["mekf-receiver"] = navigate_mekf(flight, times, receiver=receiver.noise)
-    scored = evaluate_all(flight, found, times, reference)
-    return Studied(flight, reference, times, found, scored, receiver, refusal)
-
-
-def numbers_of(studied: Studied, begin: float, end: float = np.inf) -> dict[tuple[str, str], float]:
-    """What is compared over flights, by (subject, name): `summarise`; of the filter ``nis_<source>``, and of
-    logged flights ``lag1_<source>``; on twins of the tuned filters how often they have the autopilot within
-    their bounds (`shares_within`).
-
-    There is no NEES without a truth, and no error of position where the reference has no velocity: its
-    positions are then those of the receiver, which the estimate is made from.
-    """
-    table = studied.flight.nav[studied.reference]
-    hidden = [] if studied.reference == REFERENCES[0] else ["nees"]
-    hidden += [] if set(VELOCITY) <= set(table) else [f"rms_{place}" for place in PLACES]
-    numbers = {
-        (subject, name): value
-        for subject, errors in studied.scored.items()
-        for name, value in summarise(errors, begin, end).items()
-        if np.isfinite(value) and not name.startswith(tuple(hidden))
-    }
-    for subject in ("mekf", "mekf-receiver"):
-        if subject not in studied.found:
-            continue
-        for row in summarise_innovations(studied.found[subject], begin, end).to_dict(orient="records"):
-            source = row["source"].replace(" ", "_")
-            numbers[subject, f"nis_{source}"] = row["nis"]
-            if studied.flight.manifest.kind == "logged":
-                numbers[subject, f"lag1_{source}"] = row["lag1"]
-    if "autopilot" in studied.scored:
-        for subject in [name for name in TUNINGS if name in studied.found]:
-            shares = shares_within(against_autopilot(studied, subject), begin)
-            numbers |= {(subject, name): value for name, value in shares.items()}
-    return numbers
-
-
-def shares_within(errors: NavigationErrors, begin: float = -np.inf) -> dict[str, float]:
-    """Share of the errors within two of the stated standard deviations, of ``roll``, ``pitch``, ``yaw`` and
-    ``velocity`` (all three axes), from a time on."""
-    late = errors.times >= begin
-    e, two = errors.error[late], 2 * errors.sd[late]
-    known = np.isfinite(e) & np.isfinite(two)
-    inside = np.where(known, np.abs(e) <= two, np.nan)
-    shares = {f"inside_{name}": float(_mean(inside[:, 6 + i])) for i, name in enumerate(AXES)}
-    return shares | {"inside_velocity": float(_mean(inside[:, 3:6].ravel()))}
-
-
-def against_autopilot(studied: Studied, subject: str) -> NavigationErrors:
-    """Differences of an estimate from the autopilot, as H 7.5 has them: neither of the two is the truth."""
-    one = studied.found[subject]
-    return errors_against(studied.flight.nav["autopilot"], one.nav, studied.times, one.velocity_covariance)
-
-
-def corrections(flight: Flight, found: Navigated) -> Array:
-    """What turned the estimate from one row to the next besides the gyros, rad, (M - 1,).
-
-    Zero but for what measurements correct. Meant for estimates at all inertial samples: across the vertical,
-    where Euler angles jump, this does not.
-    """
-    imu, times = flight.table("imu"), found.nav["time_s"].to_numpy(float)
-    rows = np.searchsorted(imu["time_s"].to_numpy(float), times)
-    rate = imu[[f"w_{axis}_rad_s" for axis in "xyz"]].to_numpy(float)[rows]
-    bias = found.biases[[f"gyro_{axis}_rad_s" for axis in "xyz"]].to_numpy(float)
-    felt = (rate[1:] + rate[:-1]) / 2 - bias[1:]
-    attitude = Rotation.from_quat(found.nav[["q_w", "q_x", "q_y", "q_z"]].to_numpy(float), scalar_first=True)
-    turned = (attitude[:-1].inv() * attitude[1:]).as_rotvec()
-    return np.linalg.norm(turned - felt * np.diff(times)[:, None], axis=1)
-
-
-def unit_of(name: str) -> str:
-    """The unit of one of those numbers."""
-    if name.startswith(("nees", "nis", "lag1", "inside")):
-        return "1"
-    return "deg" if name.endswith(AXES) else "m/s" if name.endswith("velocity") else "m"
-
-
-class Series(NamedTuple):
-    """NEES or NIS (N,) of one run over its times (N,), s, with ``dof`` degrees of freedom; NaN: none.
-
-    ``worth``: at most so many independent values, where the errors themselves say so: one that lasts is one,
-    however much its square wavers.
-    """
-
-    name: str
-    dof: float
-    times: Array
-    values: Array
-    worth: float = np.inf
-
-
-def worth(values: ArrayLike) -> float:
-    """How many independent values those of one run (N,) are worth for their mean; NaN are left out.
-
-    Parameters
-    ----------
-    values
-        (N,) in the order of time.
-
-    Returns
-    -------
-    float
-        From 1 to N, or 0 where there is none.
-
-    Examples
-    --------
-    >>> worth([2.0, 1.0, float("nan")])
-    2.0
-    """
-    array = np.asarray(values, float)
-    known = array[np.isfinite(array)]
-    if len(known) < 4 or np.ptp(known) == 0:
-        return float(len(known))
-    return float(np.clip(effective_sample_size(known, len(known) - 1), 1.0, len(known)))
-
-
-def mean_of_runs(runs: Sequence[Series]) -> Average:
-    """Mean of the same quantity over independent runs, and the 95 % interval of a consistent filter's.
-
-    Parameters
-    ----------
-    runs
-        One series for each run; degrees of freedom that differ are averaged over the values.
-
-    Returns
-    -------
-    Average
-        ``worth`` is the sum of what each run is worth.
-
-    Examples
-    --------
-    >>> run = Series("NEES", 2, np.arange(3.0), np.array([1.0, 2.0, 3.0]))
-    >>> mean = mean_of_runs([run, run])
-    >>> mean.mean, mean.n, mean.worth, mean.inside
-    (2.0, 6, 6.0, True)
-    """
-    values = np.concatenate([np.asarray(run.values, float) for run in runs])
-    known = np.array([np.isfinite(run.values).sum() for run in runs])
-    dof = float(np.average([run.dof for run in runs], weights=known)) if known.any() else runs[0].dof
-    return average(values, dof, sum(min(worth(run.values), run.worth) for run in runs))
-
-
-def navigation_series(errors: NavigationErrors, begin: float = -np.inf, end: float = np.inf) -> list[Series]:
-    """NEES of position, velocity and attitude, three degrees of freedom each, of a part of a flight.
-
-    Parameters
-    ----------
-    errors
-        Against a reference that is the truth: else it is the difference of two estimates that is scored.
-    begin, end
-        s.
-
-    Returns
-    -------
-    list of Series
-        Those blocks that have values.
-
-    Examples
-    --------
-    >>> nothing = np.full((2, 9), np.nan)
-    >>> blocks = {"position": np.array([3.0, 2.0]), "velocity": nothing[:, 0], "attitude": nothing[:, 0]}
-    >>> [s.name for s in navigation_series(NavigationErrors(np.arange(2.0), nothing, nothing, blocks))]
-    ['NEES position']
-    """
-    part = (errors.times >= begin) & (errors.times < end)
-    all_blocks = [Series(f"NEES {name}", 3, errors.times[part], errors.nees[name][part]) for name in BLOCKS]
-    return [one for one in all_blocks if np.isfinite(one.values).any()]

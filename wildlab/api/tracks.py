@@ -21,14 +21,11 @@ from wildlab.analysis.navigate import (
     MekfTuning,
     Navigated,
     NavigationErrors,
-    Series,
     comparison_times,
     errors_against,
     flown_part,
-    mean_of_runs,
     navigate_mekf,
     navigate_observer,
-    navigation_series,
     summarise,
 )
 from wildlab.analysis.tracks import tracker
@@ -37,7 +34,7 @@ from wildlab.analysis.tracks.scores import FEW_INDEPENDENT, seen_of, verdict, wo
 from wildlab.analysis.tracks.single_target import SMOOTHED, TOGETHER, SensorTrack
 from wildlab.analysis.tracks.tracker import WHITE, TrackingResult
 from wildlab.errors import WildlabError
-from wildlab.evaluation.consistency import Average, nees, position_nees
+from wildlab.evaluation.consistency import Average, Series, mean_of_runs, nees, position_nees
 from wildlab.evaluation.errors import summarise_track, track_errors
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.files import check_model
@@ -501,6 +498,16 @@ def consistency(
         )
     means = {name: mean_of_runs(runs) for name, runs in gathered.items()}
     return Consistency(means, {name: tuple(runs) for name, runs in gathered.items()})
+
+
+def navigation_series(errors: NavigationErrors, begin: float, end: float) -> list[Series]:
+    """NEES of position, velocity and attitude, three degrees of freedom each, between two times, s.
+
+    Those blocks that have values; of a reference that is the truth, else two estimates' difference is scored.
+    """
+    part = (errors.times >= begin) & (errors.times < end)
+    blocks = [Series(f"NEES {name}", 3, errors.times[part], nees[part]) for name, nees in errors.nees.items()]
+    return [one for one in blocks if np.isfinite(one.values).any()]
 
 
 def _series(one: Tracked | Navigation) -> list[Series]:

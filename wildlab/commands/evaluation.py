@@ -105,9 +105,8 @@ def georeference(flight: Path, out: Path, overwrite: bool, source: str | None, s
     """
     import numpy as np
 
+    from wildlab.analysis.georeference import SUFFIXES, ground_facts, observe, write_points
     from wildlab.analysis.georeference import georeference as to_ground
-    from wildlab.analysis.georeference import observe
-    from wildlab.analysis.ground import SUFFIXES, ground_facts, write_points
     from wildlab.flight.store import load_flight
     from wildlab.messages.catalogue import words
     from wildlab.runner.evaluate import tell_source

@@ -11,8 +11,8 @@ Floating Objects using UAVs with Optical Sensors, doctoral thesis, NTNU 2019.
 - `gospa`: how far is a set of tracks? `compare_identities`: who follows whom, how long, and how well.
 - `estimate_position_noise`: how rough is the truth itself?
 - `mean_interval`, `mean_share_interval`, `share_interval`: what do so many independent runs say?
-- `summarise`, `scatter_by_image`, `bootstrap_interval`, `estimate_pose_noise`: single positions, and why they
-  err; `time_blocks`, `block_mean`, `compare_halves`: in blocks in time order.
+- `summarise`, `scatter_by_image`, `bootstrap_interval`: single positions, and why they err;
+  `time_blocks`, `block_mean`, `compare_halves`: in blocks in time order.
 - `held_out`, `gain_of`, `rank_models`: which constant error is behind them, `estimate_wander`: against noise
   that is correlated in time; `split_along`; `find_outliers`.
 - `judge_ellipses`, `spread_of_sightings`: what they are worth.
@@ -72,7 +72,7 @@ if TYPE_CHECKING:
         time_blocks,
     )
     from wildlab.evaluation.outliers import Outlier, find_outliers, largest_visible
-    from wildlab.evaluation.pose_noise import PoseNoise, estimate_pose_noise, estimate_position_noise
+    from wildlab.evaluation.pose_noise import estimate_position_noise
 else:
     __getattr__, __dir__ = offer(__name__)
 
@@ -90,7 +90,6 @@ __all__ = [
     "Linear",
     "Moment",
     "Outlier",
-    "PoseNoise",
     "Ranked",
     "Scatter",
     "Spread",
@@ -106,7 +105,6 @@ __all__ = [
     "compare_halves",
     "compare_identities",
     "effective_sample_size",
-    "estimate_pose_noise",
     "estimate_position_noise",
     "estimate_wander",
     "find_outliers",

@@ -1,20 +1,9 @@
-"""How noisy were poses and pixels? Standard deviations estimated from the errors of known points.
-
-Every image has a pose error of its own: position (three axes), two tilts and a heading. It moves all points
-of the image together, each through its own derivative, and that tells it from the error of single pixels,
-where clicking and an imperfect lens model end up. The standard deviations are those under which the observed
-errors are most likely, with a broad prior about the ones assumed, so that what the data cannot decide stays
-put.
-"""
+"""Kinds of errors of poses and pixels, and how rough logged positions are."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import minimize
 
 Array = NDArray[np.float64]
 
@@ -29,135 +18,6 @@ KINDS: dict[str, tuple[int, ...]] = {
 }
 #: Standard deviation of the prior on the logarithm: a factor of three either way.
 PRIOR = np.log(3.0)
-#: How many times as far off as the others an image is that is far out.
-FAR = 10.0
-
-
-class PoseNoise(NamedTuple):
-    """Estimated standard deviations by :data:`KINDS` (metres, radians, pixels) and how well each is decided.
-
-    ``factor`` is what one standard deviation of the estimate multiplies or divides by: near 3 the data said
-    nothing, near 1 they decided.
-    """
-
-    sd: dict[str, float]
-    factor: dict[str, float]
-
-
-def estimate_pose_noise(
-    errors: ArrayLike,
-    derivatives: ArrayLike,
-    pixel_derivatives: ArrayLike,
-    noise: ArrayLike,
-    image: ArrayLike,
-    assumed: dict[str, float],
-    far_out: float = 0.0,
-) -> PoseNoise:
-    """Most likely standard deviations of the pose and pixel errors behind the errors of known points.
-
-    Parameters
-    ----------
-    errors
-        (N, 2) north-east in n, metres, computed minus known. A row with NaN here, in ``derivatives`` or in
-        ``noise`` is left out.
-    derivatives
-        (N, 2, 6) of each point with respect to north, east, down (m), two tilts and the heading (rad).
-    pixel_derivatives
-        (N, 2, 2) of each point with respect to its pixel, m per pixel.
-    noise
-        (N, 2, 2) covariance, m^2, of what else is each point's own and known: plane height, survey.
-    image
-        (N,) which image each belongs to.
-    assumed
-        Standard deviations by :data:`KINDS` about which the prior lies, above zero: m, rad, pixels.
-    far_out
-        Share of the images, below one, that is taken to be :data:`FAR` times as far off as the others
-        (Tukey's contaminated normal distribution); zero takes all for normal.
-
-    Returns
-    -------
-    PoseNoise
-
-    Raises
-    ------
-    ValueError
-        Where fewer than three images have a usable point.
-    """
-    e, J, Ju, R = (np.asarray(a, float) for a in (errors, derivatives, pixel_derivatives, noise))
-    keep = np.isfinite(e).all(axis=1) & np.isfinite(J).all(axis=(1, 2)) & np.isfinite(R).all(axis=(1, 2))
-    labels = np.asarray(image)[keep]
-    e, J, R, own_pixel = e[keep], J[keep], R[keep], (Ju @ np.swapaxes(Ju, 1, 2))[keep]
-    blocks = _by_points(labels, e, J, R, own_pixel)
-    if sum(len(residual) for residual, *_ in blocks) < 3:
-        raise ValueError("fewer than three images with known points: their noise cannot be estimated")
-    start = np.log([assumed[kind] for kind in KINDS])
-
-    def log_density(squared: Array, size: int) -> Array:
-        if not far_out:
-            return -0.5 * squared
-        usual = np.log1p(-far_out) - 0.5 * squared
-        far = np.log(far_out) - size * np.log(FAR) - 0.5 * squared / FAR**2
-        return np.asarray(np.logaddexp(usual, far))
-
-    def negative_log_posterior(log_sd: Array) -> float:
-        variance = np.empty(6)
-        for kind, value in zip(KINDS, log_sd, strict=True):
-            variance[list(KINDS[kind])] = np.exp(2 * value)
-        pixel = np.exp(2 * log_sd[-1])
-        total = 0.5 * np.sum(((log_sd - start) / PRIOR) ** 2)
-        for residual, derivative, own, of_pixel in blocks:
-            spread = derivative * variance @ np.swapaxes(derivative, 1, 2)
-            L = np.linalg.cholesky(own + pixel * of_pixel + spread)
-            z = np.linalg.solve(L, residual[..., None])
-            squared = (z**2).sum(axis=(1, 2))
-            total += np.log(np.diagonal(L, axis1=1, axis2=2)).sum() - log_density(squared, z.shape[1]).sum()
-        return float(total)
-
-    # Bounded, for the first step along a steep slope would otherwise leap to where no prior brings it back.
-    bounds = [(s - 4 * PRIOR, s + 4 * PRIOR) for s in start]
-    found = minimize(negative_log_posterior, start, method="L-BFGS-B", bounds=bounds)
-    curvature = _second_derivatives(negative_log_posterior, found.x)
-    factor = np.exp(np.sqrt(np.clip(np.diag(np.linalg.inv(curvature)), 0, None)))
-    return PoseNoise(
-        sd=dict(zip(KINDS, map(float, np.exp(found.x)), strict=True)),
-        factor=dict(zip(KINDS, map(float, factor), strict=True)),
-    )
-
-
-def _by_points(
-    labels: NDArray[Any], e: Array, J: Array, R: Array, own_pixel: Array
-) -> list[tuple[Array, Array, Array, Array]]:
-    """Residuals (K, 2m), derivatives (K, 2m, 6) and both covariances (K, 2m, 2m) of the K images that have m
-    points each, for every m: images of one size are worked on together."""
-    _, which, points = np.unique(labels, return_inverse=True, return_counts=True)
-    order = np.argsort(which, kind="stable")
-    blocks = []
-    for m in np.unique(points):
-        rows = order[points[which[order]] == m].reshape(-1, m)
-        k = len(rows)
-        each = np.zeros((2, k, m, 2, m, 2))
-        for i in range(m):
-            each[0, :, i, :, i], each[1, :, i, :, i] = R[rows[:, i]], own_pixel[rows[:, i]]
-        own, of_pixel = each.reshape(2, k, 2 * m, 2 * m)
-        blocks.append((e[rows].reshape(k, 2 * m), J[rows].reshape(k, 2 * m, 6), own, of_pixel))
-    return blocks
-
-
-def _second_derivatives(function: Callable[[Array], float], x: Array, h: float = 1e-3) -> Array:
-    """Hessian (n, n) by central differences."""
-    steps = h * np.eye(len(x))
-    return np.array(
-        [
-            [
-                (function(x + a + b) - function(x + a - b) - function(x - a + b) + function(x - a - b))
-                / (4 * h * h)
-                for b in steps
-            ]
-            for a in steps
-        ]
-    )
-
-
 #: Samples in a row of which a parabola leaves one residual.
 SAMPLES = 4
 #: Samples further apart than this many usual intervals are no neighbours.

@@ -31,7 +31,6 @@ from wildlab.navigation.mekf import (
     Innovations,
     Navigation,
     Outages,
-    log_likelihood,
     pose_covariance,
     run_mekf,
     signs_of_trouble,
@@ -50,7 +49,6 @@ from wildlab.navigation.observer import (
     field_reference,
     run_observer,
 )
-from wildlab.navigation.receiver import ReceiverNoise, SourceNoise
 from wildlab.navigation.strapdown import DeadReckoning, Gap, ImuSamples, integrate_strapdown
 
 __all__ = [
@@ -69,9 +67,7 @@ __all__ = [
     "Navigation",
     "Observed",
     "Outages",
-    "ReceiverNoise",
     "Reference",
-    "SourceNoise",
     "align_at",
     "align_at_rest",
     "align_from_baseline",
@@ -83,7 +79,6 @@ __all__ = [
     "find_rest",
     "hard_iron",
     "integrate_strapdown",
-    "log_likelihood",
     "pose_covariance",
     "positions",
     "run_mekf",

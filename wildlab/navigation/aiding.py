@@ -28,7 +28,7 @@ from wildlab.navigation.strapdown import (
 
 
 class GaussMarkov(NamedTuple):
-    """A Gauss-Markov error that a source's measurements share.
+    """A first-order Gauss-Markov error that a source's measurements share.
 
     Attributes
     ----------
@@ -36,40 +36,10 @@ class GaussMarkov(NamedTuple):
         (3,) stationary standard deviation per axis of n, m or m/s.
     time
         Correlation time, s.
-    rate_time
-        Of first order where 0. Else what drives the error is not white, but of first order itself, with this
-        correlation time, s: the error of a receiver that smooths its fixes moves on for a while.
     """
 
     sd: Array
     time: float
-    rate_time: float = 0.0
-
-    @property
-    def order(self) -> int:
-        """1 or 2."""
-        return 2 if self.rate_time > 0 else 1
-
-    def covariance(self) -> Array:
-        """Stationary, of the errors and, behind them, of their rates: (3, 3) or (6, 6)."""
-        if self.order == 1:
-            return np.diag(self.sd**2)
-        both = self.sd**2 / self.time
-        rate = both * (1 / self.time + 1 / self.rate_time)
-        return np.block([[np.diag(self.sd**2), np.diag(both)], [np.diag(both), np.diag(rate)]])
-
-    def process(self) -> Array:
-        """Density and time of each of those states, and how far behind an error its rate is, (3 or 6, 3)."""
-        if self.order == 1:
-            density, driver = self.sd * np.sqrt(2 / self.time), np.zeros(3)
-            return np.stack([density, np.full(3, self.time), driver], axis=-1)
-        rate = np.sqrt(np.diagonal(self.covariance())[3:])
-        return np.vstack(
-            [
-                np.tile([0.0, self.time, 3.0], (3, 1)),
-                np.stack([rate * np.sqrt(2 / self.rate_time), np.full(3, self.rate_time), np.zeros(3)], -1),
-            ]
-        )
 
 
 class Aiding(NamedTuple):
@@ -255,7 +225,7 @@ def gather(
 
     kind = joined([np.full(int(keep.sum()), a.kind, float) for a, keep in pairs], ()).astype(np.int64)
     source = joined([np.full(int(k.sum()), i, float) for i, (_, k) in enumerate(pairs)], ()).astype(np.int64)
-    sizes = np.array([0 if a.gauss_markov is None else 3 * a.gauss_markov.order for a in aiding] + [0])
+    sizes = np.array([0 if a.gauss_markov is None else 3 for a in aiding] + [0])
     states = np.where(sizes > 0, first + np.cumsum(sizes) - sizes, -1).astype(np.int64)
     measured = Measurements(
         np.searchsorted(line.times, t[order]).astype(np.int64), kind, joined([a.value[k] for a, k in pairs]),

@@ -164,65 +164,27 @@ def kept_and_driven(dt: float, density: float, time: float) -> tuple[float, floa
 
 
 @compiled
-def fed_by_rate(dt: float, time: float, rate_time: float) -> float:
-    """What a rate of one, which decays, leaves in an error that decays as well, after dt."""
-    difference = 1 / rate_time - 1 / time
-    if abs(difference) * dt < 1e-6:  # where the quotient would be 0 / 0
-        return float(dt * np.exp(-dt / time))
-    return float((np.exp(-dt / time) - np.exp(-dt / rate_time)) / difference)
-
-
-@compiled
-def driven_by_rate(dt: float, time: float, density: float, rate_time: float) -> tuple[float, float]:
-    """Variance that the noise of a rate adds to the error over dt, and its covariance with the rate's.
-
-    What the stationary process loses over dt is what the noise puts back.
-    """
-    rate = density * density * rate_time / 2
-    both = rate * time * rate_time / (time + rate_time)
-    kept, kept_rate = np.exp(-dt / time), np.exp(-dt / rate_time)
-    fed = fed_by_rate(dt, time, rate_time)
-    own = time * both * (1 - kept * kept) - 2 * kept * fed * both - fed * fed * rate
-    return own, both - kept_rate * (kept * both + fed * rate)
-
-
-@compiled
 def carry_extra(x: Array, P: Array, M: Array, dt: float, extra: Array) -> None:
-    """Errors beyond the fifteen over a step: of first or second order, or constant. M (n, 15) is ``P Phi'``.
+    """Gauss-Markov or constant errors beyond the fifteen over a step. M (n, 15) is ``P Phi'``.
 
-    ``extra`` (n - 15, 3) has their densities and times, and how many states behind an error its rate is; 0
-    where it has none. A rate comes behind its error, which so still finds it as it was.
+    ``extra`` (n - 15, 2) has their densities and times.
     """
     n = P.shape[0]
     for k in range(len(extra)):
-        i, d, kept, fed = N_ERRORS + k, N_ERRORS + k, 1.0, 0.0
+        i, kept = N_ERRORS + k, 1.0
         if not np.isinf(extra[k, 1]):
             kept = np.exp(-dt / extra[k, 1])
             x[i + 1] *= kept
             for j in range(N_ERRORS, n):
                 P[i, j] *= kept
-            if extra[k, 2] > 0:
-                d = i + int(extra[k, 2])
-                fed = fed_by_rate(dt, extra[k, 1], extra[d - N_ERRORS, 1])
-                x[i + 1] += fed * x[d + 1]
-                for j in range(N_ERRORS, n):
-                    P[i, j] += fed * P[d, j]
             for j in range(N_ERRORS, n):
                 P[j, i] *= kept
-                if d != i:
-                    P[j, i] += fed * P[j, d]
         for j in range(N_ERRORS):
-            P[i, j] = P[j, i] = kept * M[i, j] + fed * M[d, j]
+            P[i, j] = P[j, i] = kept * M[i, j]
     for k in range(len(extra)):
         i = N_ERRORS + k
         if not np.isinf(extra[k, 1]):
             P[i, i] += kept_and_driven(dt, extra[k, 0], extra[k, 1])[1]
-        if extra[k, 2] > 0:
-            d = i + int(extra[k, 2])
-            own, shared = driven_by_rate(dt, extra[k, 1], extra[d - N_ERRORS, 0], extra[d - N_ERRORS, 1])
-            P[i, i] += own
-            P[i, d] += shared
-            P[d, i] += shared
 
 
 @compiled

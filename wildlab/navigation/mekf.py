@@ -129,8 +129,7 @@ class MekfInputs(NamedTuple):
     """What both the compiled filter and its reference take.
 
     ``state`` (n + 1,) and ``covariance`` (n, n) are those of the start, with the errors beyond the fifteen;
-    ``extra`` (n - 15, 3) is the density and the time of these and where their rate is (see
-    `GaussMarkov.process`), ``axes`` whether the axes' are among them.
+    ``extra`` (n - 15, 2) is the density and the time of these, ``axes`` whether the axes' are among them.
     """
 
     line: Timeline
@@ -176,14 +175,14 @@ def prepare(
 
 
 def _extra(aiding: Sequence[Aiding], axes: AxisErrors | None) -> tuple[Array, Array]:
-    """Covariance at the start (n, n) of the errors beyond the fifteen; densities, times, rates (n, 3)."""
-    covariances, processes = [np.empty((0, 0))], [np.empty((0, 3))]
+    """Covariance at the start (n, n) of the errors beyond the fifteen; densities and times (n, 2)."""
+    covariances, processes = [np.empty((0, 0))], [np.empty((0, 2))]
     if axes is not None:
         covariances += [axes.covariance()] * 2
-        processes.append(np.tile([0.0, np.inf, 0.0], (18, 1)))
-    for process in (a.gauss_markov for a in aiding if a.gauss_markov is not None):
-        covariances.append(process.covariance())
-        processes.append(process.process())
+        processes.append(np.tile([0.0, np.inf], (18, 1)))
+    for slow in (a.gauss_markov for a in aiding if a.gauss_markov is not None):
+        covariances.append(np.diag(slow.sd**2))
+        processes.append(np.stack([slow.sd * np.sqrt(2 / slow.time), np.full(3, slow.time)], axis=-1))
     return block_diag(*covariances), np.concatenate(processes)
 
 
@@ -312,27 +311,6 @@ def pose_covariance(covariance: ArrayLike) -> Array:
     P = np.asarray(covariance, float)
     keep = np.array([0, 1, 2, 6, 7, 8])
     return P[..., keep[:, None], keep]
-
-
-def log_likelihood(innovations: Innovations, since: float = -np.inf) -> float:
-    """How likely the measurements were, up to a constant: what a latency or a noise may be chosen by.
-
-    Rejected measurements count as much as the others, or the choice that rejects most would win.
-
-    Parameters
-    ----------
-    innovations
-        Of the measurements, as `Navigation` has them.
-    since
-        Measurements before this time (s) are left out.
-
-    Returns
-    -------
-    float
-        The logarithm of the likelihood, without the constants that depend on the number of measurements only.
-    """
-    late = innovations.times >= since
-    return -0.5 * float(np.sum(innovations.nis[late] + np.linalg.slogdet(innovations.S[late])[1]))
 
 
 NAMES = {kernels.POSITION: "positions", kernels.VELOCITY: "velocities"}

@@ -90,9 +90,6 @@ def entry_of(flight: OwnFlight, quantity: Quantity) -> Mapping[str, Any] | None:
     if report is None:
         return None
     entry = report.numbers.get((quantity.name, quantity.subject))
-    if quantity.subject == "mekf":
-        # What the page on the navigation speaks of, where the receiver's noise was found.
-        entry = report.numbers.get((quantity.name, "mekf-receiver"), entry)
     if quantity.report == "tracking":
         alike = [*report.of_leading_filter(quantity.name).values()]
         entry = alike[0] if len(alike) == 1 else None

@@ -10,11 +10,17 @@ import pandas as pd
 from wildlab.analysis.accuracy import Accuracy
 from wildlab.analysis.diagnose import Diagnosis
 from wildlab.analysis.evaluate import blocks_of, errors_of, score_points
-from wildlab.analysis.georeference import Observations, georeference
-from wildlab.analysis.ground import on_level, points_geojson, shift_from_level, with_axes
+from wildlab.analysis.georeference import (
+    Observations,
+    georeference,
+    on_level,
+    points_geojson,
+    shift_from_level,
+    with_axes,
+)
+from wildlab.evaluation.correlated_errors import WanderNoise
 from wildlab.evaluation.errors import AlongAxis, ErrorSummary, bootstrap_interval, summarise
 from wildlab.evaluation.outliers import Outlier
-from wildlab.evaluation.pose_noise import PoseNoise
 from wildlab.files import csv_text
 from wildlab.flight.store import Flight
 from wildlab.geometry.calibration import BORESIGHT, Calibration
@@ -256,7 +262,7 @@ def parts_table(found: Accuracy) -> pd.DataFrame:
     return pd.DataFrame([*rows, {"part": names["whole"], "rms": float(scatter.whole_m)}])
 
 
-def noise_table(noise: PoseNoise, assumed: Mapping[str, float]) -> pd.DataFrame:
+def noise_table(noise: WanderNoise, assumed: Mapping[str, float]) -> pd.DataFrame:
     """Assumed and estimated standard deviations, one row each, in degrees, metres and pixels."""
     names = load_texts("georeferencing").quantities
     return pd.DataFrame(
@@ -266,7 +272,6 @@ def noise_table(noise: PoseNoise, assumed: Mapping[str, float]) -> pd.DataFrame:
                 "assumed": assumed[key],
                 "estimated": np.degrees(noise.sd[kind]) if unit == "deg" else noise.sd[kind],
                 "unit": unit,
-                "factor": noise.factor[kind],
             }
             for kind, (key, unit) in _NOISE.items()
         ]

@@ -9,8 +9,7 @@ from typing import Any
 
 from rich.console import Console
 
-from wildlab.analysis.navigate import reference_of
-from wildlab.analysis.navigation_inputs import imu_noise
+from wildlab.analysis.navigate import imu_noise, reference_of
 from wildlab.analysis.tracks.tracker import refuse_unusable
 from wildlab.errors import WildlabError
 from wildlab.flight.calibration_files import calibration_toml, read_learnt, refuse_other_camera

@@ -22,7 +22,6 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.analysis.georeference import observe
-from wildlab.analysis.rendered import Photographer, exposures_of
 from wildlab.analysis.tracks.pixels import truth_states
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import Flight
@@ -34,6 +33,7 @@ from wildlab.reporting.charts.forms import draw_picture, spread_points
 from wildlab.reporting.figures import BLUE, INK, ORANGE, VERMILLION, map_axes, new_figure
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.twins import simulate_twin
+from wildlab.studies.vessel_detection import Photographer, exposures_of
 from wildlab.tracking.association import (
     Assignment,
     global_nearest,

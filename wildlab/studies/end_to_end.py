@@ -13,7 +13,6 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from wildlab.analysis.rendered import Marks, Photographer, exposures_of, marks_of, with_detections
 from wildlab.analysis.tracks.pixels import PixelMeasurements, read_pixels
 from wildlab.errors import WildlabError
 from wildlab.evaluation.intervals import mean_interval, mean_share_interval
@@ -33,6 +32,7 @@ from wildlab.studies import coloured_noise as coloured
 from wildlab.studies import linear_vs_nonlinear as filters
 from wildlab.studies.monte_carlo import interval_words
 from wildlab.studies.rules import keys_of, load_rules
+from wildlab.studies.vessel_detection import Marks, Photographer, exposures_of, marks_of, with_detections
 
 Numbers = dict[tuple[str, str], float]
 

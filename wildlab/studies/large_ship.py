@@ -14,14 +14,6 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 from numpy.typing import NDArray
 
-from wildlab.analysis.rendered import (
-    Marks,
-    Photographer,
-    Shot,
-    exposures_of,
-    marks_of,
-    with_detections,
-)
 from wildlab.analysis.tracks.pixels import CvTuning, PixelMeasurements, read_pixels, track_pixels
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
@@ -31,6 +23,14 @@ from wildlab.reporting.charts.forms import draw_errors, draw_marks, draw_picture
 from wildlab.reporting.figures import BLUE, GREEN, INK, VERMILLION, map_axes, new_figure
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.twins import simulate_twin
+from wildlab.studies.vessel_detection import (
+    Marks,
+    Photographer,
+    Shot,
+    exposures_of,
+    marks_of,
+    with_detections,
+)
 from wildlab.tracking.run import Track
 
 #: Numbers of a flight by (subject, name).

@@ -15,18 +15,17 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
+from scipy.optimize import minimize
 
-from wildlab.analysis.navigate import PUBLISHED_LIKE, errors_against, navigate_mekf, worth
-from wildlab.analysis.pose_noise import NAMES as POSE_NAMES
-from wildlab.analysis.pose_noise import (
-    covariance_of,
-    estimate_from_sighting,
-    flight_numbers,
-    mean,
-    pauses,
-    pose_numbers,
-    premise_numbers,
-    shown,
+from wildlab.analysis.georeference import assumed_deviations
+from wildlab.analysis.navigate import (
+    AXES,
+    PLACES,
+    PUBLISHED_LIKE,
+    VELOCITY,
+    NavigationErrors,
+    errors_against,
+    navigate_mekf,
 )
 from wildlab.analysis.tracks.pixels import (
     CvTuning,
@@ -39,13 +38,21 @@ from wildlab.analysis.tracks.pixels import (
     track_schmidt,
 )
 from wildlab.errors import WildlabError
-from wildlab.evaluation.consistency import Average, average, chi_square_interval, position_nees, share_inside
-from wildlab.evaluation.errors import summarise_track, track_errors
+from wildlab.evaluation.consistency import (
+    Average,
+    average,
+    chi_square_interval,
+    position_nees,
+    share_inside,
+    worth,
+)
+from wildlab.evaluation.errors import SLOWEST_M_S, summarise_track, track_errors
 from wildlab.evaluation.intervals import share_interval
-from wildlab.evaluation.pose_noise import PoseNoise
-from wildlab.flight.clocks import frame_times
+from wildlab.evaluation.pose_noise import PRIOR
+from wildlab.flight.clocks import frame_times, poses_at
 from wildlab.flight.store import Flight
-from wildlab.geometry.frames import Array
+from wildlab.geometry.frames import Array, Indices, matrix_to_euler, wrap
+from wildlab.geometry.uncertainty import ground_jacobians
 from wildlab.reporting.charts.drawing import finish, new_strips
 from wildlab.reporting.charts.forms import Values, draw_lines, plain_numbers
 from wildlab.reporting.charts.tracks import (
@@ -62,6 +69,207 @@ from wildlab.tracking.batch import BatchCamera, run_batch
 from wildlab.tracking.kalman import Considered
 from wildlab.tracking.run import Track
 from wildlab.tracking.sensors import POSE
+
+#: A time without detections that is longer is a pause, s.
+PAUSE_S = 2.0
+#: From this bank on an airframe turns, rad.
+TURNING = np.radians(20.0)
+#: Columns of `wildlab.analysis.navigate.NavigationErrors` that are a pose's, and their names.
+_POSE = [0, 1, 2, 6, 7, 8]
+POSE_NAMES = (*PLACES, *AXES)
+
+
+def pauses(seen: PixelMeasurements) -> list[Indices]:
+    """Rows of the frames of each pause, from the first to the last without a detection.
+
+    Parameters
+    ----------
+    seen
+        From `wildlab.analysis.tracks.pixels.read_pixels`.
+
+    Returns
+    -------
+    list of (K,) arrays
+        In order of time; empty where no two detections are further apart than `PAUSE_S`.
+    """
+    rows = np.flatnonzero(seen.detected)
+    long = np.flatnonzero(np.diff(seen.times[rows]) > PAUSE_S)
+    return [np.arange(rows[i] + 1, rows[i + 1]) for i in long]
+
+
+def pose_numbers(own: NavigationErrors) -> dict[str, float]:
+    """What poses state of themselves and how far they are off; m and degrees.
+
+    Parameters
+    ----------
+    own
+        Errors of a nav source against the true poses of the camera's airframe, at the frames:
+        ``errors_against(flight.nav["truth"], flight.nav[source], seen.times)``.
+
+    Returns
+    -------
+    dict
+        ``mean_sd_north`` to ``mean_sd_yaw``, means of what is stated, and ``rms_north`` to ``rms_yaw``.
+    """
+    numbers = {}
+    for i, name in zip(_POSE, POSE_NAMES, strict=True):
+        numbers[f"mean_sd_{name}"] = shown(name, mean(own.sd[:, i]))
+        numbers[f"rms_{name}"] = shown(name, rms(own.error[:, i]))
+    return numbers
+
+
+def premise_numbers(
+    flight: Flight, seen: PixelMeasurements, source: str, own: NavigationErrors
+) -> dict[str, float]:
+    """What sentences on the poses speak of; degrees.
+
+    Parameters
+    ----------
+    flight
+        With the nav sources ``autopilot`` and ``source``.
+    seen
+        With the poses of that source.
+    own
+        As for `pose_numbers`.
+
+    Returns
+    -------
+    dict
+        ``sd_spread``: the range that nine of ten of a stated deviation lie in over its median, of the
+        coordinate or angle that changes most. ``difference_roll`` to ``difference_yaw``: RMS against the
+        autopilot; ``outside_...``: share beyond two deviations. ``difference_turning`` and
+        ``..._straight``: roll's, while the airframe turns and not. ``shift_px``: RMS over detections and both
+        axes of what the pose's error moves the target by in the image; ``largest_shift_px``: the farthest
+        that it does.
+    """
+    sd = own.sd[np.isfinite(own.sd[:, 0])][:, _POSE]
+    low, middle, high = np.quantile(sd, (0.05, 0.5, 0.95), axis=0)
+    numbers = {"sd_spread": float(((high - low) / middle).max())}
+    beside = errors_against(flight.nav["autopilot"], flight.nav[source], seen.times)
+    for i, name in enumerate(AXES, 6):
+        off = beside.error[:, i]
+        beyond = np.where(np.isfinite(off), np.abs(off) > 2 * beside.sd[:, i], np.nan)
+        numbers[f"difference_{name}"] = shown(name, rms(off))
+        numbers[f"outside_{name}"] = mean(beyond)
+    turns = np.abs(matrix_to_euler(seen.poses.R_nb)[:, 0]) > TURNING
+    for word, rows in (("turning", turns), ("straight", ~turns)):
+        numbers[f"difference_{word}"] = shown("roll", rms(beside.error[rows, 6]))
+    rows = np.flatnonzero(seen.detected)
+    J = ground_jacobians(seen.poses.take(rows), seen.uv[rows], seen.plane_down[rows])
+    shift = np.linalg.solve(J.pixel, J.pose @ own.error[rows][:, _POSE, None])
+    far = np.hypot(*shift[:, :, 0].T)
+    return numbers | {"shift_px": rms(shift.ravel()), "largest_shift_px": float(np.nanmax(far))}
+
+
+def flight_numbers(flight: Flight, seen: PixelMeasurements) -> dict[str, float]:
+    """How a twin was flown, and over what.
+
+    Parameters
+    ----------
+    flight
+        With the nav source ``truth`` and inertial samples.
+    seen
+        What its camera saw.
+
+    Returns
+    -------
+    dict
+        ``detections``, ``pauses``; shares of the frames in which the airframe is ``turning`` and the target
+        ``moving`` faster than `SLOWEST_M_S`; ``crab`` (deg), RMS of heading minus course on straight legs;
+        ``settled``, for how long (s) there were inertial samples when the target was first seen.
+    """
+    nav = flight.nav["truth"]
+    p, R, _ = poses_at(nav, seen.times)
+    roll, _, yaw = matrix_to_euler(R).T
+    north, east = (np.interp(seen.times, nav["time_s"], nav[name]) for name in VELOCITY[:2])
+    turns = np.abs(roll) > TURNING
+    crab = wrap(yaw - np.arctan2(east, north))[~turns & np.isfinite(p[:, 0])]
+    return {
+        "detections": float(seen.detected.sum()),
+        "pauses": float(len(pauses(seen))),
+        "turning": float(turns.mean()),
+        "moving": mean(np.hypot(*seen.truth[:, 2:].T) > SLOWEST_M_S),
+        "crab": float(np.degrees(rms(crab))),
+        "settled": float(seen.times[0] - flight.table("imu")["time_s"].iloc[0]),
+    }
+
+
+def shown(name: str, value: float) -> float:
+    """A number of a pose for a reader: angles (by their name) in degrees, coordinates as they are."""
+    return float(np.degrees(value)) if name in AXES else value
+
+
+def mean(values: ArrayLike) -> float:
+    """Mean of the known values; NaN where there is none."""
+    array = np.asarray(values, float)
+    known = array[np.isfinite(array)]
+    return float(known.mean()) if len(known) else float("nan")
+
+
+def rms(values: ArrayLike) -> float:
+    """Root mean square of the known values; NaN where there is none."""
+    return float(np.sqrt(mean(np.square(np.asarray(values, float)))))
+
+
+#: Images nearer in time than this say the same of a pose whose error wanders over tens of seconds, s.
+APART_S = 1.0
+
+
+#: Which deviation each of the six pose errors has: of north and east, down, roll and pitch, yaw.
+_SHARED = [0, 0, 1, 2, 2, 3]
+
+
+def estimated_covariance(flight: Flight, seen: PixelMeasurements) -> Array:
+    """Covariance (6, 6), H (7.39), of the poses of a camera that followed a target whose positions are known.
+
+    Position in n, attitude in b. The deviations, with one of the pixel, are those under which the target's
+    errors are likeliest, with a broad prior about what the poses state of themselves. The known positions are
+    taken for exact. Images nearer than `APART_S` to the last one are left out.
+
+    Parameters
+    ----------
+    flight
+        What it states of the pixel and of the ground's height is assumed.
+    seen
+        From `wildlab.analysis.tracks.pixels.read_pixels`, with truth.
+
+    Returns
+    -------
+    (6, 6) m^2 and rad^2, diagonal.
+
+    Raises
+    ------
+    WildlabError
+        Where the poses have no covariance.
+    """
+    if seen.poses.covariance is None:
+        raise WildlabError(
+            "the poses have no covariance to begin with", "use those of the MEKF: navigate_mekf(flight)"
+        )
+    rows = np.flatnonzero(seen.detected & np.isfinite(seen.truth[:, :2]).all(axis=1))
+    slots = np.floor((seen.times[rows] - seen.times[0]) / APART_S)
+    rows = rows[np.unique(slots, return_index=True)[1]]
+    rows = rows[np.isfinite(seen.positions[rows]).all(axis=1)]
+    errors = seen.positions[rows] - seen.truth[rows, :2]
+    J = ground_jacobians(seen.poses.take(rows), seen.uv[rows], seen.plane_down[rows])
+    stated = np.sqrt(np.nanmean(np.diagonal(seen.poses.covariance, axis1=1, axis2=2), axis=0))
+    usual = assumed_deviations(flight)
+    own = usual["plane_height_m"] ** 2 * J.plane[:, :, None] * J.plane[:, None, :]
+    of_pixel = J.pixel @ np.swapaxes(J.pixel, 1, 2)
+    begin = np.log([stated[:2].mean(), stated[2], stated[3:5].mean(), stated[5], usual["pixel_px"]])
+
+    def negative_log_posterior(log_sd: Array) -> float:
+        spread = J.pose * np.exp(2 * log_sd[_SHARED]) @ np.swapaxes(J.pose, 1, 2)
+        L = np.linalg.cholesky(own + np.exp(2 * log_sd[-1]) * of_pixel + spread)
+        squared = (np.linalg.solve(L, errors[..., None]) ** 2).sum(axis=(1, 2))
+        likely = np.log(np.diagonal(L, axis1=1, axis2=2)).sum() + (0.5 * squared).sum()
+        return float(0.5 * np.sum(((log_sd - begin) / PRIOR) ** 2) + likely)
+
+    # Bounded, for the first step along a steep slope would otherwise leap to where no prior brings it back.
+    bounds = [(s - 4 * PRIOR, s + 4 * PRIOR) for s in begin]
+    found = minimize(negative_log_posterior, begin, method="L-BFGS-B", bounds=bounds).x
+    return np.diag(np.square(np.exp(found[_SHARED])))
+
 
 Numbers = dict[tuple[str, str], float]
 
@@ -165,15 +373,15 @@ def only(covariance: ArrayLike, attitude: bool) -> Array:
     return P
 
 
-def compare(seen: PixelMeasurements, by_sheet: PixelMeasurements, noise: PoseNoise) -> dict[str, Track]:
+def compare(seen: PixelMeasurements, by_sheet: PixelMeasurements, estimated: Array) -> dict[str, Track]:
     """All of `SUBJECTS` on the same detections; but for ``schmidt-data-sheet`` on the same poses.
 
     Parameters
     ----------
     seen, by_sheet
         From `navigated_sighting` and `sheet_sighting`.
-    noise
-        Estimated on another flight.
+    estimated
+        (6, 6) covariance of a pose, from another flight.
 
     Raises
     ------
@@ -189,7 +397,7 @@ def compare(seen: PixelMeasurements, by_sheet: PixelMeasurements, noise: PoseNoi
     told |= {"schmidt-attitude-only": only(P, True), "schmidt-position-only": only(P, False)}
     fixed = {constant(degrees): constant_covariance(degrees) for degrees in DEGREES}
     fixed |= {constant(DEGREES[1], metres): constant_covariance(DEGREES[1], metres) for metres in METRES}
-    fixed["schmidt-estimated"] = covariance_of(noise)
+    fixed["schmidt-estimated"] = estimated
     told |= {who: np.tile(one, (len(P), 1, 1)) for who, one in fixed.items()}
     tracks = dict(zip(told, _follow_each(seen, list(told.values())), strict=True)) | {
         "ekf": track_pixels(seen, TUNING),
@@ -231,9 +439,9 @@ def compare_flight(flight: Flight, seed: int) -> Compared:
     if flight.manifest.twin is None:
         raise WildlabError("the flight is logged", "use a twin: there is a calibration flight of it")
     other = first_part(simulate_twin(flight.manifest.twin.name, seed + CALIBRATION), CALIBRATION_S)
-    noise = estimate_from_sighting(other, navigated_sighting(other))
+    covariance = estimated_covariance(other, navigated_sighting(other))
     seen, by_sheet = navigated_sighting(flight), sheet_sighting(flight)
-    tracks = compare(seen, by_sheet, noise)
+    tracks = compare(seen, by_sheet, covariance)
     moment = float(np.random.default_rng([seed, CALIBRATION]).random())
     scored = {
         who: evaluate(seen, track, moment) if who in FILTERS else evaluate_nees(seen, track, moment)
@@ -245,7 +453,7 @@ def compare_flight(flight: Flight, seed: int) -> Compared:
         found = pose_numbers(own)
         found |= premise_numbers(flight, seen, source, own) if source == SOURCE else {}
         beside |= {(source, name): value for name, value in found.items()}
-    estimated = zip(POSE_NAMES, np.sqrt(np.diag(covariance_of(noise))), strict=True)
+    estimated = zip(POSE_NAMES, np.sqrt(np.diag(covariance)), strict=True)
     beside |= {(ESTIMATED, f"mean_sd_{name}"): shown(name, float(sd)) for name, sd in estimated}
     return Compared(seen, tracks, scored, beside)
 

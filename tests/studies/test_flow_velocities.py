@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from tests.analysis.conftest import changed
-from wildlab.analysis.flow import (
-    FramePair,
-    Reading,
-    pair_velocities,
-)
 from wildlab.detection.flow import Matches
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.scene.flights import SceneFlight
 from wildlab.simulation.twins import simulate_twin
+from wildlab.studies.optical_flow_velocity import (
+    FramePair,
+    Reading,
+    pair_velocities,
+)
 
 TWIN = "gimballed-ship"
 SHIP = np.array([[20.0, 4.0, 0.0], [-20.0, 3.0, 0.0], [0.0, -6.0, 0.0], [10.0, 0.0, 0.0]])

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from wildlab.analysis.rendered import Photographer, exposures_of, marks_of, with_detections
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.simulation.twins import simulate_twin
+from wildlab.studies.vessel_detection import Photographer, exposures_of, marks_of, with_detections
 
 TWIN, SEED = "large-ship", 2
 
