@@ -1,4 +1,4 @@
-"""What a camera sees of a terrain, beside lines followed in small steps and beside the whole map."""
+"""Lines of sight over a terrain, beside the walk of rays."""
 
 import numpy as np
 import pytest
@@ -6,13 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wildlab.errors import WildlabError
-from wildlab.geometry.camera import Camera, in_image
-from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.frames import euler_to_matrix
-from wildlab.geometry.georeference import MISSED, ground_to_pixel
-from wildlab.geometry.mount import Mount
+from wildlab.geometry.camera import Camera
+from wildlab.geometry.georeference import MISSED
 from wildlab.geometry.terrain import Terrain, intersect_terrain
-from wildlab.geometry.viewsheds import SHORT_OF, lines_clear, visible_nodes
+from wildlab.geometry.viewsheds import SHORT_OF, lines_clear
 
 CAMERA = Camera(160, 128, 250.0, 250.0, 80.0, 64.0)
 
@@ -56,35 +53,3 @@ def test_no_line_leads_to_what_is_not_known():
     assert lines_clear(terrain, points, lenses).tolist() == [True, False, False]
     with pytest.raises(WildlabError, match="one camera for each point"):
         lines_clear(terrain, points, np.zeros((2, 3)))
-
-
-@settings(max_examples=60, deadline=None)
-@given(
-    st.integers(0, 10**6), st.floats(-0.6, 0.6), st.floats(-0.9, 1.3), st.floats(-3.1, 3.1),
-    st.sampled_from([0.0, 1.5]), st.sampled_from([15.0, 60.0, np.inf]),
-)  # fmt: skip
-def test_the_block_leaves_nothing_out(seed, roll, pitch, yaw, above, furthest):
-    terrain = rough(seed)
-    p = np.array([3.0, -5.0, -20.0])
-    pose = CameraPoses(CAMERA, Mount("down"), p, euler_to_matrix(roll, pitch, yaw))
-    seen = visible_nodes(terrain, pose, above, furthest)
-    whole = np.zeros(terrain.height.shape, bool)
-    whole[seen.rows, seen.columns] = seen.visible
-    north, east = (at + terrain.step * np.arange(24) for at in (terrain.north, terrain.east))
-    points = np.stack([*np.meshgrid(north, east, indexing="ij"), -terrain.height - above], axis=-1)
-    points = points.reshape(-1, 3).astype(float)
-    uv = ground_to_pixel(CAMERA, points, pose.p_nc, pose.R_nc)
-    expected = in_image(CAMERA, uv) & lines_clear(terrain, points, p)
-    expected &= np.linalg.norm(points - p, axis=1) <= furthest
-    assert np.array_equal(whole.ravel(), expected)
-
-
-def test_a_lens_that_folds_back_shows_nothing_behind_its_edge():
-    folds = Camera(160, 128, 100.0, 100.0, 80.0, 64.0, distortion=(-0.2, 0.0, 0.0, 0.0, 0.0))
-    flat = Terrain(np.zeros((201, 201), np.float32), -400.0, -400.0, 4.0)
-    pose = CameraPoses(folds, Mount("down"), np.array([0.0, 0.0, -40.0]), np.eye(3))
-    seen = visible_nodes(flat, pose)
-    at = np.argwhere(seen.visible) + np.array([seen.rows.start, seen.columns.start])
-    assert len(at) > 100 and np.hypot(*(at * 4.0 - 400.0).T).max() < 60
-    behind = ground_to_pixel(folds, [[80.0, 0.0, 0.0]], pose.p_nc, pose.R_nc)
-    assert in_image(folds, behind).all(), "the polynomial alone would show it"

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from wildlab.geometry.camera import Camera
+from wildlab.geometry.camera import Camera, in_image
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix
+from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.mount import R_MC_DOWN, Mount
 from wildlab.geometry.terrain import Terrain
-from wildlab.geometry.viewsheds import visible_nodes
+from wildlab.geometry.viewsheds import lines_clear, widest_view
 from wildlab.planning.coverage import (
     Coverage,
     Sightings,
@@ -47,6 +48,23 @@ def poses_over(terrain: Terrain, seed: int, count: int = 40) -> CameraPoses:
     return CameraPoses.at_lens(CAMERA, p, R, np.eye(3))
 
 
+def shown_alone(terrain: Terrain, pose: CameraPoses, furthest: float) -> NDArray[np.bool_]:
+    """Which nodes one image shows: each projected, and its line of sight followed."""
+    north, east = (
+        at + terrain.step * np.arange(n)
+        for at, n in zip((terrain.north, terrain.east), terrain.height.shape, strict=True)
+    )
+    points = np.stack([*np.meshgrid(north, east, indexing="ij"), -terrain.height.astype(float)], axis=-1)
+    p, R, points = pose.p_nc.reshape(3), pose.R_nc.reshape(3, 3), points.reshape(-1, 3)
+    x, y, z = ((points - p) @ R).T
+    # Far outside the image a lens's polynomial may fold back into it.
+    shown = (z > 0) & (np.hypot(x, y) <= (1 + 1e-9) * widest_view(CAMERA) * z)
+    shown &= np.linalg.norm(points - p, axis=1) <= furthest
+    shown[shown] = in_image(CAMERA, ground_to_pixel(CAMERA, points[shown], p, R))
+    shown[shown] = lines_clear(terrain, points[shown], p)
+    return shown.reshape(terrain.height.shape)
+
+
 @pytest.mark.parametrize("holes", [False, True])
 def test_many_images_show_what_each_shows_alone(holes):
     terrain = hills(3, holes)
@@ -54,12 +72,20 @@ def test_many_images_show_what_each_shows_alone(holes):
     found = see(terrain, poses, 150.0)
     some = 0
     for k in range(poses.rows[0]):
-        alone = visible_nodes(terrain, poses.take(k), furthest=150.0)
-        shown = np.zeros(terrain.height.shape, bool)
-        shown[alone.rows, alone.columns] = alone.visible
+        shown = shown_alone(terrain, poses.take(k), 150.0)
         assert np.array_equal(np.sort(found.node[found.image == k]), np.flatnonzero(shown))
         some += int(shown.sum())
     assert some > 2000
+
+
+def test_a_lens_that_folds_back_shows_nothing_behind_its_edge():
+    folds = Camera(160, 128, 100.0, 100.0, 80.0, 64.0, distortion=(-0.2, 0.0, 0.0, 0.0, 0.0))
+    flat = Terrain(np.zeros((201, 201), np.float32), -400.0, -400.0, 4.0)
+    poses = CameraPoses(folds, Mount("down"), np.array([[0.0, 0.0, -40.0]]), np.eye(3))
+    at = np.stack(np.divmod(see(flat, poses, 500.0).node, 201))
+    assert at.shape[1] > 100 and np.hypot(*(at * 4.0 - 400.0)).max() < 60
+    behind = ground_to_pixel(folds, [[80.0, 0.0, 0.0]], poses.p_nc[0], poses.R_nc[0])
+    assert in_image(folds, behind).all(), "the polynomial alone would show it"
 
 
 def cover(terrain: Terrain, poses: CameraPoses, times: NDArray[np.float64], sharp=None, **more) -> Coverage:

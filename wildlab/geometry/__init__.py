@@ -184,11 +184,9 @@ if TYPE_CHECKING:
     )
     from wildlab.geometry.viewsheds import (
         Footprint,
-        VisibleBlock,
         footprint,
         image_border,
         lines_clear,
-        visible_nodes,
         widest_view,
     )
 else:
@@ -229,7 +227,6 @@ __all__ = [
     "Twist",
     "Velocity",
     "Views",
-    "VisibleBlock",
     "apply_calibration",
     "arc_bend",
     "attitude_covariance",
@@ -328,7 +325,6 @@ __all__ = [
     "undistort_approximately",
     "velocity_covariance",
     "view_errors",
-    "visible_nodes",
     "widest_view",
     "with_covariance",
     "wrap",

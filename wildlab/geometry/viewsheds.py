@@ -9,32 +9,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.geometry.camera import Camera, distort, in_image, normalise
+from wildlab.geometry.camera import Camera, distort, normalise
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, wrap
-from wildlab.geometry.georeference import HIT, ground_to_pixel, pixel_rays
+from wildlab.geometry.georeference import HIT, pixel_rays
 from wildlab.geometry.terrain import Terrain, _to_grid, intersect_terrain
 
 #: A line of sight ends this share of its length before the point: the point lies on the ground itself.
 SHORT_OF = 1e-7
 #: Along each side of the image, rays that bound the footprint.
 BORDER_RAYS = 9
-
-
-class VisibleBlock(NamedTuple):
-    """A block of nodes of a terrain, and which of them a camera sees.
-
-    Attributes
-    ----------
-    rows, columns
-        Of the terrain's grid: ``terrain.height[rows, columns]`` is the block.
-    visible
-        (R, C) bool.
-    """
-
-    rows: slice
-    columns: slice
-    visible: NDArray[np.bool_]
 
 
 def lines_clear(terrain: Terrain, points: ArrayLike, p_nc: ArrayLike) -> NDArray[np.bool_]:
@@ -87,78 +71,6 @@ def lines_clear(terrain: Terrain, points: ArrayLike, p_nc: ArrayLike) -> NDArray
         return np.asarray(clear_all(terrain.height, blocks, shapes, lenses, ends, SHORT_OF, terrain._top))
 
 
-def visible_nodes(
-    terrain: Terrain, poses: CameraPoses, above: float = 0.0, furthest: float = np.inf
-) -> VisibleBlock:
-    """Which nodes of a terrain one image shows.
-
-    Parameters
-    ----------
-    terrain
-        In the same n.
-    poses
-        The camera, with one pose.
-    above
-        How far above the ground what is looked for stands, metres.
-    furthest
-        Distance up to which it can be seen, metres.
-
-    Returns
-    -------
-    Seen
-        The block holds all nodes that the image can show; it has no nodes where it shows none.
-
-    Raises
-    ------
-    WildlabError
-        Where there is more than one pose.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from wildlab.geometry.mount import Mount
-    >>> camera = Camera(100, 100, 100.0, 100.0, 50.0, 50.0)
-    >>> flat = Terrain(np.zeros((101, 101), np.float32), north=-100.0, east=-100.0, step=2.0)
-    >>> pose = CameraPoses(camera, Mount("down"), np.array([0.0, 0.0, -20.0]), np.eye(3))
-    >>> seen = visible_nodes(flat, pose)
-    >>> int(seen.visible.sum()), seen.rows
-    (121, slice(44, 57, None))
-    """
-    p, R = np.asarray(poses.p_nc, float), np.asarray(poses.R_nc, float)
-    if p.size != 3 or R.size != 9:
-        raise WildlabError(
-            f"positions of the shape {p.shape} and attitudes of {R.shape}", "give one pose", field="poses"
-        )
-    p, R = p.reshape(3), R.reshape(3, 3)
-    rows, columns = _block(terrain, poses.camera, p, R, above, furthest)
-    height = terrain.height[rows, columns].astype(float)
-    north = terrain.north + terrain.step * np.arange(rows.start, rows.stop)
-    east = terrain.east + terrain.step * np.arange(columns.start, columns.stop)
-    points = np.stack([*np.meshgrid(north, east, indexing="ij"), -height - above], axis=-1).reshape(-1, 3)
-    looked_at = _in_view(poses.camera, points, p, R)
-    if np.isfinite(furthest):
-        looked_at &= np.linalg.norm(points - p, axis=1) <= furthest
-    which = np.flatnonzero(looked_at)
-    visible = np.zeros(len(points), bool)
-    if len(which):
-        visible[which] = lines_clear(terrain, points[which], p)
-    return VisibleBlock(rows, columns, visible.reshape(height.shape))
-
-
-def _in_view(camera: Camera, points: Array, p: Array, R: Array) -> NDArray[np.bool_]:
-    """(N,) bool: whether points are in the image; False for NaN."""
-    offset = (points - p) @ R
-    with np.errstate(invalid="ignore", divide="ignore"):
-        ahead = offset[:, 2] > 0
-        # Far outside the image a lens's polynomial may fold back into it.
-        outermost = widest_view(camera)
-        ahead &= np.hypot(offset[:, 0], offset[:, 1]) <= (1 + 1e-9) * outermost * offset[:, 2]
-    found = np.zeros(len(points), bool)
-    which = np.flatnonzero(ahead)
-    found[which] = in_image(camera, ground_to_pixel(camera, points[which], p, R))
-    return found
-
-
 def widest_view(camera: Camera) -> float:
     """How far from the axis an image shows anything.
 
@@ -198,31 +110,6 @@ def image_border(camera: Camera) -> Array:
     zero, one = np.zeros(BORDER_RAYS), np.ones(BORDER_RAYS)
     sides = [(along, zero), (along, one), (zero, along), (one, along)]
     return np.concatenate([np.stack([u * right, v * down], axis=1) for u, v in sides])
-
-
-def _block(
-    terrain: Terrain, camera: Camera, p: Array, R: Array, above: float, furthest: float
-) -> tuple[slice, slice]:
-    """Rows and columns of nodes about all that an image can show, one more on each side.
-
-    What it shows lies between the lowest and the highest height, so within the hull of where the border's
-    rays come to these two; where one of them never does, within the furthest distance.
-    """
-    rows, columns = terrain.height.shape
-    reach = np.array([p[:2] - furthest, p[:2] + furthest])
-    low, high = float(np.nanmin(terrain.height)) + above, terrain._top + above
-    rays = pixel_rays(camera, image_border(camera), R)
-    if (rays[:, 2] > 1e-6 * np.abs(rays).max()).all():
-        there = max(-p[2] - high, 0.0), max(-p[2] - low, 0.0)
-        ends = np.concatenate([p[:2] + (drop / rays[:, 2:]) * rays[:, :2] for drop in there])
-        reach = np.array([np.maximum(reach[0], ends.min(axis=0)), np.minimum(reach[1], ends.max(axis=0))])
-    first = np.floor((np.clip(reach[0], -1e9, 1e9) - (terrain.north, terrain.east)) / terrain.step) - 1
-    last = np.ceil((np.clip(reach[1], -1e9, 1e9) - (terrain.north, terrain.east)) / terrain.step) + 2
-    spans = [
-        slice(int(np.clip(a, 0, n)), int(np.clip(b, np.clip(a, 0, n), n)))
-        for a, b, n in zip(first, last, (rows, columns), strict=True)
-    ]
-    return spans[0], spans[1]
 
 
 class Footprint(NamedTuple):
@@ -267,7 +154,7 @@ def footprint(
     Returns
     -------
     Footprint
-        What hides ground inside the outline is not cut out: `visible_nodes` does that.
+        What hides ground inside the outline is not cut out.
 
     Raises
     ------

@@ -3,7 +3,7 @@ meanwhile.
 
 A node counts as seen where an image shows it with nothing before it, and sharply: an image is blurred where
 the camera turns and moves by more than a stated number of pixels while it is exposed. All images are looked
-at at once (`wildlab.geometry.viewsheds.visible_nodes` does the same for one), and lines of sight are exact.
+at at once, and lines of sight are exact.
 """
 
 from __future__ import annotations
