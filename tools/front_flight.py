@@ -1,13 +1,17 @@
-"""The flight of the front page, simulated anew: writes ``data/front-flight.json``, which a test compares.
+"""The moving picture of the front page, simulated and drawn anew; a test compares.
 
-::
+``python tools/front_flight.py`` writes ``data/front-flight.svg`` and, with the numbers of its caption,
+``data/front-flight.json``.
 
-    python tools/front_flight.py
+It plays by itself, over and over: SMIL within one element, no script, no request. It is drawn twice. The
+moving layer plays; the still one is one moment of it, and is what shows where motion is unwanted
+(``prefers-reduced-motion``), on paper, and where the reader has stopped it. Metres, north up.
 """
 
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -24,7 +28,9 @@ from wildlab.analysis.image_coverage import cover_images
 from wildlab.analysis.tracks.pixels import CvTuning, read_pixels, start
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic
-from wildlab.reporting.front_page import FILE
+from wildlab.geometry.covariances import ellipse_axes, inside_ellipse
+from wildlab.messages.quantities import nice_length
+from wildlab.reporting.front_page import FLIGHT, PROBABILITY
 from wildlab.simulation.twins import simulate_twin
 from wildlab.tracking.kalman import Considered
 from wildlab.tracking.run import run_filter
@@ -38,14 +44,8 @@ TWIN, SEED, SOURCE, BEGIN, AT_LEAST, AT_MOST = "drifting-vessel-eight", 1, "auto
 ACCELERATION, START_SPEED, PERSIST = 0.1, 5.0, 10.0
 
 
-def simulated() -> dict[str, Any]:
-    """The content of the file, simulated and computed.
-
-    Returns
-    -------
-    dict
-        For JSON.
-    """
+def simulated() -> tuple[dict[str, list[Array]], float]:
+    """Times and arrays of what is drawn, by name, and the mean height of the aircraft, m."""
     flight = simulate_twin(TWIN, SEED, ("imu", "gnss"))
     nav = flight.nav[SOURCE]
     when, flown = nav["time_s"].to_numpy(float), nav[["north_m", "east_m"]].to_numpy(float)
@@ -89,21 +89,145 @@ def simulated() -> dict[str, Any]:
         ),
     }
     inside = (when >= BEGIN) & (when <= end)
+    return contents, float(-nav["down_m"].to_numpy(float)[inside].mean())
+
+
+def caption(contents: Mapping[str, Sequence[Array]], height: float) -> dict[str, Any]:
+    """The numbers of the picture's caption: images that show the target, the median distance of a position
+    from one image to where the target was, and the share of instants at which the ellipse holds it."""
+    flown = contents["path"][0]
+    (times, places), (when, centres, P) = contents["points"], contents["ellipses"]
+    part = (times >= flown[0]) & (times <= flown[-1])
+    off = places[part] - _at(times[part], *contents["truth"])
+    missed = _at(when, *contents["truth"]) - centres
     return {
-        "about": f"A part of the twin {TWIN}, seed {SEED}: s since {BEGIN:g} s, m north and east, m^2.",
-        "twin": TWIN,
-        "height_m": round(float(-nav["down_m"].to_numpy(float)[inside].mean()), 1),
-        **{
-            name: {f"{k}": np.round(one, 2).tolist() for k, one in enumerate(arrays)}
-            for name, arrays in contents.items()
-        },
+        "about": f"A part of the twin {TWIN}, seed {SEED}, from {BEGIN:g} s on.",
+        "seconds": round(float(flown[-1] - flown[0]), 1),
+        "height_m": round(height, 1),
+        "images": int(part.sum()),
+        "off_m": round(float(np.median(np.hypot(*off.T))), 2),
+        "held": round(float(np.mean(inside_ellipse(missed, P, PROBABILITY))), 4),
     }
 
 
+#: Size of the picture and its margin, in the units of its own coordinates; seconds that a round takes, at how
+#: many instants it is drawn, and which of them is the still picture's.
+WIDTH, HEIGHT, MARGIN = 620.0, 420.0, 26.0
+LASTS, INSTANTS, STILL = 30.0, 175, 108
+#: An aircraft's outline from above, nose up, in units of the picture.
+AIRCRAFT = (
+    "M0-15 2.6-9 2.6-4 24 2 24 6 2.6 4.5 1.8 11 8 15 8 17.5 0 16-8 17.5-8 15-1.8 11-2.6 4.5-24 6-24 2"
+    "-2.6-4-2.6-9Z"
+)
+
+
+def drawn(contents: Mapping[str, Sequence[Array]]) -> str:
+    """What is in the ``<svg>``."""
+    (path_t, path), (held_t, centres, P), (true_t, true) = (
+        contents[name] for name in ("path", "ellipses", "truth")
+    )
+    every = np.concatenate([path, true[(true_t >= path_t[0]) & (true_t <= path_t[-1])]])
+    low, high = every.min(axis=0), every.max(axis=0)
+    scale = float(((HEIGHT - 2 * MARGIN, WIDTH - 2 * MARGIN) / (high - low)).min())
+
+    def put(points: Array) -> Array:
+        """Units to the right and down of (..., 2) m north and east."""
+        moved = (points - (low + high) / 2) * scale
+        return np.stack([WIDTH / 2 + moved[..., 1], HEIGHT / 2 - moved[..., 0]], axis=-1)
+
+    grid = np.linspace(path_t[0], path_t[-1], INSTANTS)
+    way, vessel = put(_at(grid, path_t, path)), put(_at(grid, true_t, true))
+    corners = np.clip(put(_at(grid, *contents["footprints"])), -2 * WIDTH, 3 * WIDTH)
+    outlines = [" ".join(f"{_n(x)},{_n(y)}" for x, y in one) for one in corners]
+    long_axis, short_axis, bearing = ellipse_axes(_at(grid, held_t, P), PROBABILITY)
+    rx, ry = ([_n(one) for one in axis * scale] for axis in (short_axis, long_axis))
+    # The bearing of a line is known up to half a turn: the nearest one to the last keeps it from spinning.
+    turns = [_n(one) for one in np.degrees(np.unwrap(bearing, period=np.pi))]
+    steps = np.gradient(way, axis=0)
+    heads = [_n(one) for one in np.degrees(np.unwrap(np.arctan2(steps[:, 0], -steps[:, 1])))]
+    held, crosses, crafts = (_pairs(one) for one in (put(_at(grid, held_t, centres)), vessel, way))
+    times, places = contents["points"][0], put(contents["points"][1])
+    there = (times >= grid[0]) & (times <= grid[-1])
+    shares, places = (times[there] - grid[0]) / (grid[-1] - grid[0]), places[there]
+    dots = "".join(f"M{_n(x)} {_n(y)}h0" for x, y in places[shares <= STILL / (INSTANTS - 1)])
+    k, cross, craft = STILL, '<path class="cross" d="M-8 0H8M0-8V8"', f'<path class="craft" d="{AIRCRAFT}"'
+    moving = [
+        f'<polygon class="lit" points="{outlines[0]}">{_animate("points", outlines)}</polygon>',
+        *map(_landing, shares, places),
+        f'<g>{_turn("translate", held)}<g>{_turn("rotate", turns)}<ellipse class="held" rx="{rx[0]}" '
+        f'ry="{ry[0]}">{_animate("rx", rx)}{_animate("ry", ry)}</ellipse></g></g>',
+        f"{cross}>{_turn('translate', crosses)}</path>",
+        f"<g>{_turn('translate', crafts)}{craft}>{_turn('rotate', heads)}</path></g>",
+    ]
+    still = [
+        f'<polygon class="lit" points="{outlines[k]}"/><path class="points" d="{dots}" opacity=".6"/>',
+        f'<ellipse class="held" rx="{rx[k]}" ry="{ry[k]}" '
+        f'transform="translate({held[k]}) rotate({turns[k]})"/>',
+        f'{cross} transform="translate({crosses[k]})"/>',
+        f'{craft} transform="translate({crafts[k]}) rotate({heads[k]})"/>',
+    ]
+    lines = f'<path class="gone" d="M{"L".join(crafts)}"/><path class="true" d="M{"L".join(crosses)}"/>'
+    layers = f'<g class="moves">{"".join(moving)}</g><g class="still">{"".join(still)}</g>'
+    return f"{lines}{layers}{_rules(scale)}"
+
+
+def _at(grid: Array, times: Array, values: Array) -> Array:
+    """Values (N, ...) at other times, linear between neighbours."""
+    flat = values.reshape(len(values), -1)
+    found = np.stack([np.interp(grid, times, column) for column in flat.T], axis=1)
+    return np.asarray(found.reshape(len(grid), *values.shape[1:]))
+
+
+def _animate(attribute: str, values: Sequence[str]) -> str:
+    much = f'attributeName="{attribute}" values="{";".join(values)}"'
+    return f'<animate {much} dur="{LASTS:g}s" repeatCount="indefinite"/>'
+
+
+def _turn(kind: str, values: Sequence[str]) -> str:
+    much = f'attributeName="transform" type="{kind}" values="{";".join(values)}"'
+    return f'<animateTransform {much} dur="{LASTS:g}s" repeatCount="indefinite"/>'
+
+
+def _landing(share: float, place: Array) -> str:
+    """A point that comes down at its time and fades until the round is over."""
+    a, b = min(share, 0.985), min(share + 0.25 / LASTS + 0.004, 0.99)
+    keys = f"0;{a:.4f};{b:.4f};{min(b + 2.5 / LASTS, 0.996):.4f};1"
+    dur = f'dur="{LASTS:g}s" repeatCount="indefinite" keyTimes="{keys}"'
+    return (
+        f'<circle class="point" cx="{_n(place[0])}" cy="{_n(place[1])}" r="3" opacity="0">'
+        f'<animate attributeName="opacity" values="0;0;1;.5;.28" {dur}/>'
+        f'<animate attributeName="r" values="10;10;3.4;3;3" {dur}/></circle>'
+    )
+
+
+def _rules(scale: float) -> str:
+    """Scale and north."""
+    metres = nice_length(0.25 * WIDTH / scale)
+    length, x, y = metres * scale, WIDTH - 22, HEIGHT - 20
+    return (
+        f'<path class="rule" d="M{_n(x - length)} {y:g}v-6v6H{_n(x)}v-6"/>'
+        f'<text x="{_n(x - length / 2)}" y="{y - 9:g}" text-anchor="middle">{metres:g} m</text>'
+        f'<path class="rule" d="M{WIDTH - 28:g} 48V20m-5 8 5-8 5 8"/>'
+        f'<text x="{WIDTH - 28:g}" y="63" text-anchor="middle">N</text>'
+    )
+
+
+def _pairs(places: Array) -> list[str]:
+    return [f"{_n(x)} {_n(y)}" for x, y in places]
+
+
+def _n(value: float) -> str:
+    """A coordinate to a tenth of a unit, as short as it can be written."""
+    text = f"{value:.1f}".rstrip("0").rstrip(".")
+    return "0" if text == "-0" else text
+
+
 def main() -> None:
-    """Write the file."""
-    write_atomic(FILE, json.dumps(simulated(), separators=(",", ":")) + "\n")
-    print(FILE.name)
+    """Write the files."""
+    contents, height = simulated()
+    write_atomic(FLIGHT.with_suffix(".svg"), drawn(contents) + "\n")
+    write_atomic(FLIGHT, json.dumps(caption(contents, height), indent=1) + "\n")
+    print(FLIGHT.name)
 
 
 if __name__ == "__main__":

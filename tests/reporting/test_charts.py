@@ -9,14 +9,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from matplotlib.figure import Figure
 
-from tests.figure_text import overlapping
 from wildlab.analysis.overview import Path
 from wildlab.analysis.tracks.single_target import SensorTrack
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.geometry.frames import Array
-from wildlab.reporting.charts.following import beside_plain, beside_plain_shown, map_shown
+from wildlab.reporting.charts.following import map_shown
 from wildlab.reporting.charts.navigation import (
     error_bands,
     squares_chart,
@@ -25,7 +23,6 @@ from wildlab.reporting.charts.overview import Clock, lines_chart
 from wildlab.reporting.charts.tracks import (
     speed_and_course,
 )
-from wildlab.reporting.figures import png_bytes
 from wildlab.reporting.overview import way_of
 
 N = 200
@@ -45,12 +42,6 @@ def track(name: str, off: Array, seen: Array | None = None, start: int = 0) -> S
     )  # fmt: skip
 
 
-def assert_readable(figure: Figure) -> None:
-    """No letters lie on others once it is saved."""
-    png_bytes(figure)
-    assert overlapping(figure) == []
-
-
 PLAIN = np.full(N, 10.0)
 
 
@@ -67,59 +58,13 @@ def test_the_map_of_a_target_at_rest_is_of_its_track(at_rest):
     assert north < 20.0 if at_rest else north > 900.0
 
 
-def test_gains_are_differences_of_distances_where_both_see_the_target():
-    seen = np.arange(N) % 2 == 0
-    plain, (one,) = beside_plain([track("ekf", PLAIN), track("schmidt", np.full(N, 4.0), seen)])
-    assert plain == "ekf" and one.filter == "schmidt"
-    assert one.times.tolist() == np.arange(0, N, 2).tolist()
-    assert one.gain == pytest.approx(np.full(N // 2, 6.0))
-    assert (one.nearer, one.farther, one.middle) == (1.0, 0.0, pytest.approx(6.0))
-
-
-def test_tracks_of_other_looks_are_held_together_by_time():
-    _, (one,) = beside_plain([track("kf", np.arange(N) + 1.0), track("imm", np.ones(50), start=100)])
-    assert one.times.tolist() == list(range(100, 150))
-    assert one.gain == pytest.approx(np.arange(100.0, 150.0))
-    lost = track("imm", np.full(N, np.nan))
-    assert beside_plain([track("kf", PLAIN), lost]) == ("kf", [])
-
-
-def test_each_filter_has_a_strip_and_all_have_one_axis():
-    names = ("schmidt", "coloured", "ukf", "imm", "thinned")
-    tracks = [track("ekf", PLAIN), *(track(name, PLAIN - i - 1) for i, name in enumerate(names))]
-    shown = beside_plain_shown(tracks)
-    assert shown is not None
-    figure, _, alt, caption = shown
-    assert len(figure.axes) == 4 and "4 of 5" in caption and "thinned" in alt
-    assert len({ax.get_ylim() for ax in figure.axes}) == 1
-    for i, ax in enumerate(figure.axes):
-        assert np.asarray(ax.lines[0].get_ydata(), float) == pytest.approx(np.full(N, i + 1.0))
-    assert_readable(figure)
-
-
-@pytest.mark.parametrize("largest", [300.0, 1e8])
-def test_a_filter_that_is_lost_does_not_press_the_rest_flat(largest):
-    plain = PLAIN.copy()
-    plain[-5:] = largest
-    shown = beside_plain_shown(
-        [track("ekf", plain), track("schmidt", PLAIN - 1.3), track("ukf", PLAIN + 0.7)]
-    )
-    assert shown is not None
-    figure = shown[0]
-    ax = figure.axes[0]
-    assert ax.get_yscale() == "symlog"
-    bottom, top = (ax.transData.transform((0, y))[1] for y in (0.0, 1.3))
-    assert top - bottom > 8  # pixels
-    assert_readable(figure)
-
-
 TIMES = np.linspace(0.0, 60.0, 301)
 
 
 def test_errors_and_twice_their_deviations_are_drawn():
     rng, sds = np.random.default_rng(0), [1.0, 2.0, 3.0]
     error, sd = rng.normal(0, sds, (301, 3)), np.tile(sds, (301, 1))
-    fig = error_bands(TIMES, {"mekf": error}, {"mekf": sd}, ["a (m)", "b (m)", "c (m)"], "Errors")
+    fig = error_bands(TIMES, {"mekf": error}, {"mekf": sd}, ["a (m)", "b (m)", "c (m)"])
     for i, ax in enumerate(fig.axes[:3]):
         (band,) = ax.collections
         assert band.get_paths()[0].get_extents().y1 == pytest.approx(2 * sds[i])
@@ -129,7 +74,7 @@ def test_errors_and_twice_their_deviations_are_drawn():
 
 def test_squares_have_the_band_of_chi_square():
     values = np.random.default_rng(1).chisquare(3, 301)
-    fig = squares_chart({"position": (TIMES, values)}, 3, "NIS", "NIS")
+    fig = squares_chart({"position": (TIMES, values)}, 3, "NIS")
     edges = [line.get_ydata()[0] for line in fig.axes[0].lines if len(line.get_ydata()) == 2]
     assert sorted(edges) == pytest.approx(chi_square_interval(3))
 
@@ -148,7 +93,7 @@ def courses(figure):
 def test_a_steady_course_is_drawn_about_itself_also_over_north():
     rest = TRUTH.copy()
     rest[:, 2:] *= 0.1
-    figure = speed_and_course(SECONDS, SEEN, TRUTH, {"ekf": rest}, NAMES, "Speed")
+    figure = speed_and_course(SECONDS, SEEN, TRUTH, {"ekf": rest}, NAMES)
     assert np.isnan(courses(figure)["Extended"]).all()  # of what hardly moves
     about = courses(figure)["truth"]
     assert np.ptp(about) == pytest.approx(2 * np.degrees(np.arctan(0.05)), rel=0.01)
@@ -161,7 +106,7 @@ def test_a_steady_course_is_drawn_about_itself_also_over_north():
 def test_courses_all_round_break_over_north():
     turning = TRUTH.copy()
     turning[:, 2], turning[:, 3] = np.cos(0.7 * SECONDS), np.sin(0.7 * SECONDS)
-    figure = speed_and_course(SECONDS, SEEN, turning, {"ekf": turning}, NAMES, "Speed")
+    figure = speed_and_course(SECONDS, SEEN, turning, {"ekf": turning}, NAMES)
     angle = courses(figure)["truth"]
     seen = angle[np.isfinite(angle)]
     assert len(seen) < len(angle)
@@ -176,7 +121,7 @@ SOURCES = ("autopilot", "truth", "mine", "truth-payload", "mekf")
 def test_every_source_and_the_ground_have_a_look_of_their_own():
     times = np.arange(3.0)
     series = {name: (times, times + index) for index, name in enumerate(SOURCES)}
-    figure = lines_chart(series, Clock(0.0, 10.0), "height (m)", "Heights", ground=(times, times))
+    figure = lines_chart(series, Clock(0.0, 10.0), "height (m)", ground=(times, times))
     looks = {line.get_label(): (line.get_color(), line.get_linestyle()) for line in figure.axes[0].lines}
     assert set(looks) == {"ground", *SOURCES} and len(set(looks.values())) == len(looks)
     black = {name for name, (color, _) in looks.items() if color == "#000000"}

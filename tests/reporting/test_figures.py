@@ -7,12 +7,13 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib import rcParams
 from matplotlib.figure import Figure
 
 from tests.figure_text import overlapping
 from tests.reporting.test_html import contrast
 from wildlab.reporting import figures
-from wildlab.reporting.charts import drawing, georeferencing, navigation, tracks
+from wildlab.reporting.charts import drawing, navigation, tracks
 from wildlab.reporting.figures import PHONE_WIDTH, least_size
 
 
@@ -60,7 +61,7 @@ def walk(rng: np.random.Generator, *shape: int) -> np.ndarray:
 def strips_of(rng: np.random.Generator) -> Figure:
     one = {"roll (°)": walk(rng, 181), "pitch (°)": walk(rng, 181)}
     sources = dict.fromkeys(("mekf", "truth", "autopilot", "observer"), (TIMES, one))
-    return navigation.strips(sources, LONG)
+    return navigation.strips(sources)
 
 
 def scored(rng: np.random.Generator) -> pd.DataFrame:
@@ -70,44 +71,46 @@ def scored(rng: np.random.Generator) -> pd.DataFrame:
 
 
 CHARTS: dict[str, Draw] = {
-    "scatter": lambda rng: georeferencing.error_scatter(rng.normal(0, rng.uniform(0.1, 50), (80, 2)), LONG),
-    "shares": lambda rng: georeferencing.error_shares(
-        {name: (rng.normal(0, 3, (50, 2)), figures.BLUE) for name in ("as logged", "corrected")}, LONG
+    "scatter": lambda rng: tracks.error_scatter(rng.normal(0, rng.uniform(0.1, 50), (80, 2))),
+    "shares": lambda rng: tracks.error_shares(
+        {name: (rng.normal(0, 3, (50, 2)), figures.BLUE) for name in ("as logged", "corrected")}
     ),
-    "by image": lambda rng: georeferencing.errors_by_image(scored(rng), LONG),
-    "positions": lambda rng: georeferencing.positions_map(walk(rng, 90, 2), walk(rng, 90, 2), LONG, "black"),
-    "aircraft": lambda rng: georeferencing.aircraft_map(*(walk(rng, 90, 2) for _ in range(3)), title=LONG),
-    "filter": lambda rng: georeferencing.filter_chart(*rng.gamma(2, 3, (3, 90)), title=LONG),
-    "over time": lambda rng: georeferencing.errors_over_time(TIMES, *rng.gamma(2, 3, (2, 181)), title=LONG),
-    "lags": lambda rng: georeferencing.autocorrelation_chart(
-        {"north": rng.uniform(-1, 1, 20), "east": rng.uniform(-1, 1, 20)}, 0.2, LONG
+    "by image": lambda rng: tracks.errors_by_image(scored(rng)),
+    "positions": lambda rng: tracks.positions_map(walk(rng, 90, 2), walk(rng, 90, 2), "black"),
+    "aircraft": lambda rng: tracks.aircraft_map(*(walk(rng, 90, 2) for _ in range(3))),
+    "filter": lambda rng: tracks.errors_over_time(
+        np.arange(90), *rng.gamma(2, 3, (2, 90)), "observation", rng.gamma(2, 3, 90)
+    ),
+    "over time": lambda rng: tracks.errors_over_time(TIMES, *rng.gamma(2, 3, (2, 181)), "time (s)"),
+    "lags": lambda rng: drawing.correlations_chart(
+        {"autocorrelation": {name: (rng.uniform(-1, 1, 20), "black") for name in ("north", "east")}}, [0.2]
     ),
     "track map": lambda rng: tracks.track_map(
-        walk(rng, 181, 2), {name: walk(rng, 181, 2) for name in NAMES}, NAMES, LONG,
+        walk(rng, 181, 2), {name: walk(rng, 181, 2) for name in NAMES}, NAMES,
         aircraft=walk(rng, 90, 2), measured=walk(rng, 90, 2),
     ),
     "errors": lambda rng: tracks.error_over_time(
-        TIMES, SEEN, {name: walk(rng, 181, 2) for name in NAMES}, NAMES, LONG, measured=walk(rng, 181, 2)
+        TIMES, SEEN, {name: walk(rng, 181, 2) for name in NAMES}, NAMES, measured=walk(rng, 181, 2)
     ),
     "course": lambda rng: tracks.speed_and_course(
-        TIMES, SEEN, walk(rng, 181, 4), {name: walk(rng, 181, 4) for name in NAMES}, NAMES, LONG
+        TIMES, SEEN, walk(rng, 181, 4), {name: walk(rng, 181, 4) for name in NAMES}, NAMES
     ),
     "squares": lambda rng: tracks.squares_over_time(
         TIMES, SEEN, {what: {name: rng.chisquare(2, 181) for name in NAMES} for what in ("NEES", "NIS")},
-        NAMES, LONG,
+        NAMES,
     ),
     "strips": strips_of,
     "bands": lambda rng: navigation.error_bands(
         TIMES, {name: walk(rng, 181, 3) for name in ("mekf", "observer")},
-        {"mekf": rng.gamma(2, 1, (181, 3))}, ["roll (°)", "pitch (°)", "yaw (°)"], LONG,
+        {"mekf": rng.gamma(2, 1, (181, 3))}, ["roll (°)", "pitch (°)", "yaw (°)"],
     ),
-    "biases": lambda rng: navigation.bias_chart(TIMES, walk(rng, 181, 6), rng.gamma(2, 1, (181, 6)), LONG),
+    "biases": lambda rng: navigation.bias_chart(TIMES, walk(rng, 181, 6), rng.gamma(2, 1, (181, 6))),
     "nis": lambda rng: navigation.squares_chart(
-        {name: (TIMES, rng.chisquare(3, 181)) for name in ("position", "velocity")}, 3, "NIS", LONG
+        {name: (TIMES, rng.chisquare(3, 181)) for name in ("position", "velocity")}, 3, "NIS"
     ),
-    "flights": lambda rng: drawing.dots_chart(
-        ["a", "a flight with quite a long name", "c"], rng.gamma(2, 1, 3), *np.full((2, 3), np.nan), "m",
-        LONG, 1.0,
+    "flights": lambda rng: drawing.rows_chart(
+        ["a", "a flight with quite a…", "c"], {"": drawing.Values(rng.gamma(2, 1, 3))},
+        "m", size=(4.6, 2.4),
     ),
 }  # fmt: skip
 
@@ -115,6 +118,7 @@ CHARTS: dict[str, Draw] = {
 @pytest.mark.parametrize("name", CHARTS)
 def test_no_letters_lie_on_others_and_all_can_be_read_on_a_phone(name):
     figure = CHARTS[name](np.random.default_rng(0))
+    figure.suptitle(LONG, x=0.01, ha="left", fontsize=rcParams["axes.titlesize"])
     figures.png_bytes(figure)
     assert overlapping(figure) == []
     # As wide as a phone, the smallest letters still have their pixels: nobody has to push it sideways.

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wildlab.evaluation.replication import Closeness, Comparison, Compatibility
-from wildlab.reporting import published_marks as ratios
+from wildlab.reporting import published_tables as ratios
 from wildlab.reporting.front_page import MOST_PIXELS, read_glimpse, smaller
 from wildlab.reporting.status import FIRST_LOOK, MISSING, Number
 
@@ -69,7 +69,7 @@ def test_both_answers_show_without_colour():
     numbers = [number(1.0, *both, how) for both in product(Closeness, Compatibility) for how in ("", "x")]
     drawn: dict[str, set[object]] = {}
     for one in numbers:
-        symbol = ratios.symbol(*one.answers, bool(one.fitted))
+        symbol = ratios.mark_symbol(*one.answers, bool(one.fitted))
         bare = re.sub(r'class="mark \w*"', "", symbol)
         drawn.setdefault(bare, set()).add((one.answers[0], one.answers[1] == OUTSIDE, bool(one.fitted)))
     assert len(drawn) == 16 and all(len(one) == 1 for one in drawn.values())

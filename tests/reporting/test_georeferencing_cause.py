@@ -25,7 +25,6 @@ from wildlab.geometry.calibration import Calibration
 from wildlab.messages.catalogue import load_texts
 from wildlab.reporting import georeferencing as page
 from wildlab.reporting import georeferencing_tables as tables
-from wildlab.reporting.georeferencing_tables import terrain_message
 from wildlab.reporting.report import open_report
 
 MANY = summarise(np.tile([3.0, 4.0], (50, 1)))
@@ -274,7 +273,6 @@ def test_every_sentence_has_its_words_and_every_word_its_sentence():
     said += [page.verdict_of_accuracy(*given)[1] for given, _ in REASONS]
     for word in ("honest", "too small", "too large", "undecided", "too few"):
         said.append(page._ellipse_message(ellipses(word)))
-    said += [terrain_message(1.0, 2.0, ends) for ends in ((1.0, 2.0), (-2.0, -1.0), (-1.0, 1.0))]
     texts = load_texts("georeferencing").answers
     for one in said:
         assert set(re.findall(r"{(\w+)}", texts[one.key])) <= set(one.values), one.key

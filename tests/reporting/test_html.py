@@ -21,12 +21,12 @@ from wildlab.reporting.layout import (
     METHOD,
     MOST,
     Word,
+    arrange_parts,
+    explain_words,
     load_glossary,
-    order_report,
-    with_glossary,
 )
-from wildlab.reporting.page import STYLE, failure_page, page
 from wildlab.reporting.report import Report, open_report
+from wildlab.reporting.text import STYLE, failure_page, page
 
 HOSTILE = "<script>alert(1)</script>\"'\n<img src=x onerror=alert(2)>"
 
@@ -46,7 +46,8 @@ def hostile_report() -> Report:
         report.figure(fig, name=f"figure-{width:.0f}", alt=HOSTILE, caption=HOSTILE)
     wide = pd.DataFrame({HOSTILE: [HOSTILE, None], **{f"column {i}": [i, i / 3] for i in range(12)}})
     report.table(wide, caption=HOSTILE, fold=HOSTILE)
-    report.math(r"\epsilon_k = \tilde{x}_k^\top P_k^{-1} \tilde{x}_k " + "+ a_{k} b_{k} " * 30)
+    formula = r"\epsilon_k = \tilde{x}_k^\top P_k^{-1} \tilde{x}_k " + "+ a_{k} b_{k} " * 30
+    report.text(f"$${formula}$$")
     report.limits([HOSTILE])
     report.method(f"{HOSTILE}\n\nwith $R_{{nb}}$")
     return report
@@ -228,6 +229,18 @@ def test_the_last_verdict_colours_the_bar():
     box = BeautifulSoup(whole, "html.parser").section
     assert box is not None and box["class"] == ["summary", "bad"]
     assert box.get_text() == "summarybad word" and "data-level" not in str(box)
+
+
+def with_glossary(body: str, known: list[Word] | None = None) -> str:
+    soup = BeautifulSoup(body, "html.parser")
+    explain_words(soup, known)
+    return str(soup)
+
+
+def order_report(body: str) -> str:
+    soup = BeautifulSoup(body, "html.parser")
+    arrange_parts(soup)
+    return str(soup)
 
 
 A, B = Word("NEES", ("NEES",), "Squares."), Word("pose", ("poses", "pose"), "Where & which way.")

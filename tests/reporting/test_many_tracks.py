@@ -16,7 +16,7 @@ from wildlab.evaluation.identities import Identities, Moment, TargetLife, TrackL
 from wildlab.messages.catalogue import load_texts
 from wildlab.reporting import figures
 from wildlab.reporting import many_tracks as page
-from wildlab.reporting.charts import many as charts
+from wildlab.reporting.charts import following as charts
 from wildlab.reporting.figures import PHONE_WIDTH, least_size
 from wildlab.tracking.many import POINT, Hull, Shown
 
@@ -60,10 +60,10 @@ def made(
 
 
 @pytest.mark.parametrize("seed", range(2))
-@pytest.mark.parametrize("name", ["map", "identities", "wrong"])
+@pytest.mark.parametrize("name", ["tracks", "identities", "wrong"])
 def test_letters_can_be_read_and_lie_on_no_others(name, seed):
     given = made(seed)
-    figure = getattr(charts, f"{name}_shown")(*given[: 1 if name == "map" else 2])[0]
+    figure = getattr(charts, f"{name}_shown")(*given[: 1 if name == "tracks" else 2])[0]
     figures.png_bytes(figure)
     assert overlapping(figure) == []
     assert figure.get_size_inches()[0] * least_size(figure) <= PHONE_WIDTH

@@ -22,8 +22,7 @@ from tests.reporting.test_many_tracks import made
 from wildlab.analysis.detecting.detect import TABLE_COLUMNS
 from wildlab.files import csv_text, read_csv
 from wildlab.names import FORMULA
-from wildlab.reporting.charts import drawing, following, georeferencing, many, navigation, overview, tracks
-from wildlab.reporting.charts.following import beside_plain_shown
+from wildlab.reporting.charts import drawing, following, navigation, overview, tracks
 from wildlab.reporting.detections import precision_over_recall
 from wildlab.reporting.figures import _harmless as _harmless_texts
 from wildlab.reporting.text import csv_link
@@ -140,24 +139,20 @@ def figures_of(one: str, other: str) -> Iterator[tuple[Figure, set[str]]]:
     white = following.whiteness_shown(pair, ("range", one))
     assert white is not None
     yield white[0], set()
-    beside = beside_plain_shown(pair)
-    assert beside is not None
-    yield beside[0], set()
     followed, lives = made(1, tracks=3, looks=12, name=one.replace("{", "").replace("}", "") + "{}")
-    for figure in (many.map_shown(followed), many.identities_shown(followed, lives)):
+    for figure in (following.tracks_shown(followed), following.identities_shown(followed, lives)):
         yield figure[0], set()
     poses = {name: (TIMES, {"roll (°)": TIMES, "yaw (°)": TIMES}) for name in (one, f"{other}'")}
-    yield navigation.strips(poses, other), {one, f"{other}'"}
-    yield navigation.speed_chart({name: (TIMES, WAY[:, :3]) for name in (one, f"{other}'")}, one), {one}
+    yield navigation.strips(poses), {one, f"{other}'"}
     error = {one: WAY[:, :3]}
-    yield navigation.error_bands(TIMES, error, error, ["a", "b", "c"], other), set()
+    yield navigation.error_bands(TIMES, error, error, ["a", "b", "c"]), set()
     clock = overview.Clock(0.0, TIMES[-1])
-    yield overview.lines_chart({one: (TIMES, TIMES), f"{other}'": (TIMES, TIMES)}, clock, one, other), {one}
-    yield tracks.track_map(WAY, {"a": WAY}, {"a": one}, other), {one}
-    yield drawing.dots_chart([one, other], [1.0, 2.0], [0.5, 1.5], [1.5, 2.5], one, other), set()
+    yield overview.lines_chart({one: (TIMES, TIMES), f"{other}'": (TIMES, TIMES)}, clock, one), {one}
+    yield tracks.track_map(WAY, {"a": WAY}, {"a": one}), {one}
+    yield drawing.rows_chart([one, other], {"": drawing.Values([1.0, 2.0])}, one, size=(4.6, 2.0)), set()
     curves = pd.DataFrame({"detector": [one, one], "recall": [0.1, 0.2], "precision": [1.0, 0.9]})
     yield precision_over_recall([one], curves), {one}
-    yield georeferencing.error_shares({one: (TIMES, "#000000")}, other), set()
+    yield tracks.error_shares({one: (TIMES, "#000000")}), set()
 
 
 @pytest.mark.slow

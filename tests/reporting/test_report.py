@@ -17,9 +17,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wildlab.errors import WildlabError
+from wildlab.files import write_json
 from wildlab.messages.quantities import known, percent, percent_between
 from wildlab.reporting.figures import QUICK, new_figure
-from wildlab.reporting.metrics import claim, document, metric, read_metrics, write_metrics
+from wildlab.reporting.metrics import claim, document, metric, read_metrics
 from wildlab.reporting.report import Report, open_report
 from wildlab.reporting.text import (
     csv_link,
@@ -100,7 +101,7 @@ def whole(**changes: Any) -> dict[str, Any]:
 
 def test_round_trip(tmp_path):
     content = whole(metrics=[metric("a", "b/c", np.float64(0.5), "m", n=3, low=0.1, high=0.9, source="H 1")])
-    write_metrics(tmp_path / "metrics.json", content)
+    write_json(tmp_path / "metrics.json", content)
     assert read_metrics(tmp_path / "metrics.json") == content
     assert [path.name for path in tmp_path.iterdir()] == ["metrics.json"]
 

@@ -16,10 +16,10 @@ import pytest
 from bs4 import BeautifulSoup
 
 from tests.runner.test_ledger import a_study, ran
-from tools.front_flight import simulated
+from tools import front_flight
 from wildlab.reporting import metrics
 from wildlab.reporting import notebook_pages as html
-from wildlab.reporting.front_page import FILE, Glimpse, case_cards, front_page, load_front_flight
+from wildlab.reporting.front_page import FLIGHT, Glimpse, case_cards, front_page
 from wildlab.reporting.published import published_rows
 from wildlab.reporting.published_tables import CALCULATIONS, count_answers
 from wildlab.reporting.status import StudyStatus
@@ -83,7 +83,7 @@ def some(tmp_path: Path) -> list[StudyStatus]:
 
 def page_of(studies: list[StudyStatus]) -> str:
     made = case_cards((one, Glimpse()) for one in studies if one.state != "not run")
-    return front_page(studies, load_front_flight(), study_cards=made)
+    return front_page(studies, study_cards=made)
 
 
 def test_counts_are_those_of_the_files(some, tmp_path):
@@ -101,41 +101,68 @@ def test_counts_are_those_of_the_files(some, tmp_path):
         near = [abs(ours[one["subject"]] - one["value"]) <= 0.05 for one in entries]
         agree, differ = agree + sum(near), differ + len(near) - sum(near)
     counts = count_answers(some)
-    found = counts.groups[CALCULATIONS]
+    found = counts[CALCULATIONS]
     assert (found.close["close"], found.close["not close"]) == (agree, differ) == (3, 2)
-    assert sum(counts.others.values()) == found.waiting == others == 14
-    assert counts.all == found.all == 19 and counts.of == 0, "a calculation is in no headline"
-    assert sorted(counts.others.values()) == [2, 5, 7]
-    assert "14 of the 19" in BeautifulSoup(page_of(some), "html.parser").get_text(" ", strip=True)
-
-
-def test_the_caption_follows_from_the_arrays():
-    """Numbers of the picture's caption, computed once more from the file, by hand."""
-    content = json.loads(FILE.read_text())
-    flown = np.array(content["path"]["0"])
-    (t, p), (te, xe, P), (tt, xt) = ([np.array(one) for one in content[name].values()] for name in
-                                     ("points", "ellipses", "truth"))  # fmt: skip
-    part = (t >= flown[0]) & (t <= flown[-1])
-    assert 0 < part.sum() < len(t)
-    t, p = t[part], p[part]
-    at = [np.stack([np.interp(when, tt, xt[:, k]) for k in (0, 1)], 1) for when in (t, te)]
-    off = np.median(np.linalg.norm(p - at[0], axis=1))
-    missed = at[1] - xe
-    held = np.mean(np.einsum("ni,nij,nj->n", missed, np.linalg.inv(P), missed) <= -2 * np.log(0.1))
-    caption = BeautifulSoup(front_page([], load_front_flight()), "html.parser").figcaption
-    words = caption.get_text() if caption else ""
-    assert f"{off:.0f} m" in words and str(len(t)) in words
-    assert f"{100 * held:.1f} %" in words.replace("\u00a0", " ")
+    assert found.waiting == others == 14 and found.all == 19
+    assert set(counts) == {CALCULATIONS}, "a calculation is in no tile of predictions"
 
 
 @pytest.mark.slow
 def test_the_flight_is_that_of_the_twin():
-    """The file is what the twin gives: a hundredth is rounding, a little more another machine."""
-    made, kept = simulated(), json.loads(FILE.read_text())
-    assert {key: made[key] for key in ("about", "twin")} == {key: kept[key] for key in ("about", "twin")}
-    for name in ("path", "footprints", "points", "ellipses", "truth"):
-        for key, values in made[name].items():
-            np.testing.assert_allclose(values, kept[name][key], atol=0.03)
+    """The picture and its caption are what the twin gives, computed once more by hand."""
+    contents, height = front_flight.simulated()
+    (t, p), (te, xe, P), (tt, xt) = (contents[name] for name in ("points", "ellipses", "truth"))
+    flown = contents["path"][0]
+    part = (t >= flown[0]) & (t <= flown[-1])
+    assert 0 < part.sum() < len(t)
+    at = [np.stack([np.interp(when, tt, xt[:, k]) for k in (0, 1)], 1) for when in (t[part], te)]
+    off = np.median(np.linalg.norm(p[part] - at[0], axis=1))
+    missed = at[1] - xe
+    held = np.mean(np.einsum("ni,nij,nj->n", missed, np.linalg.inv(P), missed) <= -2 * np.log(0.1))
+    kept = json.loads(FLIGHT.read_text())
+    assert kept == pytest.approx(front_flight.caption(contents, height), abs=0.01)
+    assert [kept[name] for name in ("images", "off_m", "held")] == pytest.approx(
+        [part.sum(), off, held], abs=0.01
+    )
+    words = BeautifulSoup(front_page([]), "html.parser").get_text().replace("\u00a0", " ")
+    assert f"{off:.0f} m off" in words and f"case of {part.sum()}" in words and f"{100 * held:.1f} %" in words
+    svg = FLIGHT.with_suffix(".svg").read_text()
+    old, new = (re.findall(r"-?\d*\.?\d+", one) for one in (svg, front_flight.drawn(contents)))
+    np.testing.assert_allclose(np.array(new, float), np.array(old, float), atol=0.3)
+    # By the scale drawn, the aircraft is where it was.
+    x0, x1, metres = re.findall(r'd="M([\d.]+) 400v-6v6H([\d.]+)v-6"/>.*?>(\d+) m<', svg)[0]
+    line = re.search(r'class="gone" d="M([^"]+)"', svg)
+    assert line is not None
+    drawn = np.array([one.split() for one in line[1].split("L")], float)
+    span = np.ptp(drawn, axis=0) * float(metres) / (float(x1) - float(x0))
+    assert span == pytest.approx(np.ptp(contents["path"][1], axis=0)[::-1], rel=0.02)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("still", ["asked", "stopped", "paper"])
+def test_the_picture_stands_still(browser, tmp_path, still):
+    (tmp_path / "index.html").write_text(front_page([]), "utf-8")
+    more = {"reduced_motion": "reduce"} if still == "asked" else {}
+    context = browser.new_context(viewport={"width": 700, "height": 700}, offline=True, **more)
+    tab = context.new_page()
+    tab.goto((tmp_path / "index.html").as_uri())
+    if still == "stopped":
+        tab.locator(".halt summary").click()
+    if still == "paper":
+        tab.emulate_media(media="print")
+    picture = tab.locator("svg.flown")
+
+    def moves() -> bool:
+        before = picture.screenshot()
+        tab.wait_for_timeout(1200)
+        return bool(before != picture.screenshot())
+
+    assert not moves() and tab.locator("svg.flown .still").is_visible()
+    assert not tab.locator("svg.flown .moves").is_visible()
+    if still == "stopped":
+        tab.locator(".halt summary").click()
+        assert moves()
+    context.close()
 
 
 def overview(reports: Path, folder: str, flight: str, **report: str) -> None:

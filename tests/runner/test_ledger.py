@@ -10,9 +10,10 @@ from typing import Any
 import pytest
 
 from wildlab.errors import WildlabError
+from wildlab.files import write_json
 from wildlab.reporting import metrics
 from wildlab.reporting import notebook_pages as html
-from wildlab.reporting.ledger import ledger_page
+from wildlab.reporting.front_page import ledger_page
 from wildlab.reporting.published import load_claims, load_published
 from wildlab.reporting.published_tables import tally
 from wildlab.runner.catalogue import StudyEntry, load_studies
@@ -57,7 +58,7 @@ def ran(reports: Path, *entries: dict[str, Any], study: str = "s", state: str = 
     folder = reports / study
     folder.mkdir(parents=True, exist_ok=True)
     content = {"study": study, "flight": "f", "kind": "twin", "seed": 1, "seeds": 20, "claims": []} | more
-    metrics.write_metrics(folder / "metrics.json", metrics.document(**(content | {"metrics": entries})))
+    write_json(folder / "metrics.json", metrics.document(**(content | {"metrics": entries})))
     (folder / "report.html").write_text("report")
     status = {
         "study": study,
@@ -146,7 +147,7 @@ def test_only_what_holds_counts_as_holding(tmp_path):
     # Of the theses: one holds, one more on most flights, one has no verdict.
     assert ("1 / 4", ["1", "1"]) in tiles(whole)
     assert re.search(r"<p>5 claims\b.* 4 of .* 1 of ", whole)
-    assert "50 % (40 to 60) of 200 runs" in whole and "50 of 200 runs" in whole
+    assert "50\u00a0% (40 to 60) of 200 runs" in whole and "50 of 200 runs" in whole
 
 
 def test_without_tolerance_or_spread_no_difference_is_claimed(tmp_path):
@@ -195,7 +196,7 @@ def test_ledger_of_every_state_opens_offline(tmp_path, faults):
     ]
     whole = ledger_page(statuses)
     assert "<script" not in whole and "It &lt;b&gt;broke" in whole and failed.is_dir()
-    assert "25 %" in whole and "5.000 to 23.000" in whole
+    assert "25\u00a0%" in whole and "5.000 to 23.000" in whole
     html.examine(whole, "ledger", alone=False)
     path = tmp_path / "index.html"
     path.write_text(whole, encoding="utf-8")

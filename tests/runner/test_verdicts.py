@@ -113,17 +113,18 @@ def test_a_number_is_counted_once_and_what_was_fitted_to_it_is_counted_apart(tmp
     assert [n.answers for n in one.numbers] == [("close", "outside")] * 3
     assert [n.fitted for n in one.numbers] == ["", "tuned to it", ""]
     counts = count_answers([one])
-    assert (counts.of, counts.all, counts.flights) == (1, 2, 1)
-    assert counts.groups[FITTED].compatible["outside"] == counts.groups[PREDICTED].compatible["outside"] == 1
-    assert counts.groups[PREDICTED].chance == pytest.approx(0.1)
+    assert (counts[PREDICTED].judged, sum(one.all for one in counts.values())) == (1, 2)
+    assert counts[FITTED].compatible["outside"] == counts[PREDICTED].compatible["outside"] == 1
+    assert counts[PREDICTED].chance == pytest.approx(0.1)
 
 
 def test_groups_add_up_to_all_numbers():
     """Of the real files, with nothing run."""
     statuses = [study_status(one, Path("nowhere")) for one in load_studies().values()]
     counts = count_answers(statuses)
-    assert counts.all == sum(len(one.counted) for one in statuses) == sum(counts.others.values())
-    assert {CALCULATIONS, FITTED, PREDICTED} < set(counts.groups)
+    for found in (sum(one.all for one in counts.values()), sum(one.waiting for one in counts.values())):
+        assert found == sum(len(one.counted) for one in statuses)
+    assert {CALCULATIONS, FITTED, PREDICTED} < set(counts)
     for one in (n for status in statuses for n in status.numbers):
         predicted = one.kind == ONE_FLIGHT and quantity_kind(one.name) in SIZES and not one.fitted
         assert (group_of(one) == PREDICTED) == predicted

@@ -13,8 +13,7 @@ from wildlab.files import write_json
 from wildlab.flight.manifest import manifest_toml
 from wildlab.flight.store import load_flight
 from wildlab.reporting.metrics import document
-from wildlab.reporting.page import page
-from wildlab.reporting.text import escape
+from wildlab.reporting.text import escape, page
 from wildlab.runner.record.provenance import provenance_of_flight
 
 _CODED = re.compile(r"sha256|fingerprint|epoch")

@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 from pyproj import Transformer
 
-from wildlab.sharing.secrets import Secrets
+from wildlab.sharing.scan import Secrets
 
 #: Somewhere in the north of the Baltic Sea, and on both sides of the other hemispheres.
 LATITUDE, LONGITUDE, HEIGHT = 63.417982, 10.391237, 152.738

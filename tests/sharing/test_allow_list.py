@@ -19,7 +19,7 @@ from PIL import Image, PngImagePlugin
 
 from tests.sharing.spelt import CODED, DATES, LATITUDE, LEAKS, LONGITUDE, WHEN, secrets
 from wildlab.errors import RunFailed, WildlabError
-from wildlab.reporting.page import page
+from wildlab.reporting.text import page
 from wildlab.sharing.allow_list import first_foreign_word
 from wildlab.sharing.document import read_part
 from wildlab.sharing.scan import SecretSearch
@@ -57,9 +57,9 @@ OURS = f"""<section class="summary warn" aria-label="Summary"><p>The mean error 
 role="table"><thead role="rowgroup"><tr role="row"><th role="columnheader" scope="col">filter</th></tr></thead>
 <tbody role="rowgroup"><tr role="row"><td role="cell" class="text" data-label="filter">12 %</td></tr></tbody></table>
 </div><figcaption><a class="data" download="flight-table-1.csv" href="data:text/csv;base64,{TABLE}">CSV</a></figcaption>
-</figure><svg class="flown" viewBox="0 0 620 420" role="img" aria-label="Map of the flight"><path class="gone"
-d="M369.2 245.6L368.1 244"/><circle class="point" cx="299" cy="319.7" r="3" opacity="0"/>
-<path class="craft" transform="translate(303.4 167) rotate(-593.3)" d="M0-15 2.6-9 8 17.5 0 16-8Z"/></svg>
+</figure><svg class="strip" viewBox="0 0 160 18" role="img" aria-label="ratio 1.25"><path class="axis"
+d="M369.2 245.6L368.1 244"/><circle class="published" cx="80" cy="9" r="4.6"/><rect class="range" x="60.1" y="6"
+width="40" height="6" rx="3"/></svg>
 <img alt="Map of the path" width="457" height="525" style="max-width:457px;min-width:283px"
 src="data:image/png;base64,{PIXELS}">"""
 

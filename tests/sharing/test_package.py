@@ -19,18 +19,18 @@ from tests.sharing.left import leave_report
 from wildlab.errors import WildlabError
 from wildlab.files import write_json
 from wildlab.flight.store import save_flight
-from wildlab.reporting.page import page
+from wildlab.reporting.text import page
 from wildlab.runner.record.digests import seal
 from wildlab.runner.track import MANY_NOTEBOOK as NOTEBOOK
 from wildlab.sharing.document import Chapter, join_chapters, read_part
-from wildlab.sharing.package import (
+from wildlab.sharing.reports import sources_of
+from wildlab.sharing.share import (
     check_password,
     private_folder,
     put,
     refuse_existing,
     zip_bytes,
 )
-from wildlab.sharing.reports import sources_of
 
 FILES = {"flight.html": b"<p>page</p>" * 50}
 WORDS = "correct horse battery"
@@ -69,7 +69,7 @@ def test_a_folder_to_work_in_is_private_and_gone_afterwards(tmp_path, monkeypatc
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from wildlab.sharing import package, recomputation, share as module
+from wildlab.sharing import share, recomputation, share as module
 def kill(*given, **more):
     print("all pages were made", flush=True)
     os.kill(os.getpid(), signal.SIGKILL)
@@ -138,7 +138,7 @@ BODY = """<header><h1>How far off &amp; why?</h1></header>
 <a download="a.csv" href="data:text/csv;base64,bgox">as CSV</a>
 and <a href="data:application/geo+json;base64,e30=">as a map</a>.</p>
 <!-- by jonas on kestrel -->
-<svg viewBox="0 0 9 9" aria-labelledby="t"><title id="t">An arrow</title><path d="M0 0"/></svg>"""
+<svg viewBox="0 0 9 9" aria-labelledby="t"><path d="M0 0"/></svg><p id="t">An arrow</p>"""
 FOOTER = """<p>wildlab 0.1.0 at commit <code>c247ba823b</code> · made 2026-11-23 03:24:15 UTC.</p>
 <p>All hashes are in <a href="provenance.json">provenance.json</a> beside this page.</p>
 <p>H: H. H. Helgesen, doctoral thesis, 2019.</p>"""

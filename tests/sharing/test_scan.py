@@ -16,8 +16,7 @@ from tests.sharing.spelt import DATES, LATITUDE, LEAKS, LONGITUDE, NAME, NUMBER,
 from wildlab.geometry.gravity import normal_gravity
 from wildlab.sharing.generalisation import generalise
 from wildlab.sharing.reports import Source
-from wildlab.sharing.scan import SecretSearch
-from wildlab.sharing.secrets import Secrets, flight_secrets
+from wildlab.sharing.scan import Secrets, SecretSearch, flight_secrets
 from wildlab.sharing.tiers import treatment_of
 
 # Off the equator and the meridian, where a coordinate is a small number like any other.

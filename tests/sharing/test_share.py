@@ -27,15 +27,15 @@ from wildlab.files import write_json
 from wildlab.flight.manifest import Manifest
 from wildlab.flight.store import load_flight, save_flight
 from wildlab.reporting.metrics import AGAINST, metric
-from wildlab.reporting.page import page
 from wildlab.reporting.published_tables import strip
 from wildlab.reporting.status import Number
-from wildlab.reporting.text import escape
+from wildlab.reporting.text import escape, page
 from wildlab.runner.processes.scheduling import Outcome
 from wildlab.sharing import recomputation as redrawn
+from wildlab.sharing.recomputation import share_apart
 from wildlab.sharing.reports import of_a_study
-from wildlab.sharing.sender_list import share_apart
-from wildlab.sharing.share import BEWARE, share
+from wildlab.sharing.share import share
+from wildlab.sharing.tiers import describe
 from wildlab.simulation.parameters import load_twin
 
 REPORT = Path("reports/kifaru-ridge")
@@ -246,7 +246,7 @@ def test_a_copy_that_says_otherwise_says_so_at_its_top(original, against, said, 
     judged(REPORT, original, against)
     copy = share(REPORT)
     top = BeautifulSoup(copy.file.read_text(encoding="utf-8"), "html.parser").select_one("header .sub")
-    assert top is not None and said in top.get_text() and (BEWARE in top.get_text()) == bool(said)
+    assert top is not None and said in top.get_text() and (describe("beware") in top.get_text()) == bool(said)
     if said:
         assert any(said in line for line in copy.lines)
         with pytest.raises(RunFailed, match="would not say"):

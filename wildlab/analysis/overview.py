@@ -22,7 +22,7 @@ from wildlab.analysis.image_coverage import (
     lost_data,
     ordered,
 )
-from wildlab.evaluation.streams import FINE, HARMFUL, Pace, Vibration, pace_of, runs_of, vibration_of
+from wildlab.evaluation.streams import FINE, HARMFUL, Pace, pace_of, runs_of, vibration_of
 from wildlab.flight.checks.check import Use, find, usable_for
 from wildlab.flight.clocks import frame_times, gnss_times, longest_gap
 from wildlab.flight.store import Flight
@@ -72,7 +72,7 @@ class Alarm(NamedTuple):
 
 
 def alarms_of(
-    flight: Flight, source: str | None, pace: Pace | None, vibration: tuple[Vibration, Array] | None
+    flight: Flight, source: str | None, pace: Pace | None, vibration: tuple[Array, Array] | None
 ) -> list[Alarm]:
     """Everything that is very wrong, worst first.
 
@@ -83,7 +83,7 @@ def alarms_of(
     source, pace
         The poses that are shown, and their pace; None without any.
     vibration
-        Of the inertial sensor with the (N,) stamps of its samples; None where it cannot be told.
+        (N, 3) of the inertial sensor, m/s^2, with its (N,) stamps; None where it cannot be told.
 
     Returns
     -------
@@ -104,7 +104,7 @@ def alarms_of(
         found += _beyond("leans", t, lean, LEANT_DEG)
         found += _apart(flight, source, pace)
     if vibration is not None:
-        found += _beyond("shakes", vibration[1], vibration[0].worst, HARMFUL)
+        found += _beyond("shakes", vibration[1], vibration[0].max(axis=1), HARMFUL)
     return found
 
 
@@ -190,7 +190,6 @@ def _apart(flight: Flight, source: str, pace: Pace) -> list[Alarm]:
 
 
 FORCE = ["f_x_m_s2", "f_y_m_s2", "f_z_m_s2"]
-RATE = ["w_x_rad_s", "w_y_rad_s", "w_z_rad_s"]
 #: Four satellites give a place, five show that one of them is wrong, and six which.
 FEW_SATELLITES = 6
 #: A position that is this many times as uncertain as it usually is.
@@ -250,11 +249,11 @@ class Overview:
     troubles
         Those of `TROUBLES` that there are.
     series
-        Over time: ``height``, ``speed``, ``attitude``, ``turning``, each {name: (times, values)}.
+        Over time: ``height``, ``speed``, ``attitude``, each {name: (times, values)}.
     above
         Height above ground: (N,) m along the path, and what the ground is; None where it is not known.
     vibration
-        Of the inertial sensor, and the (N,) stamps of its samples; None where it cannot be told.
+        (N, 3) of the inertial sensor, m/s^2, with its (N,) stamps; None where it cannot be told.
     coverage
         What the images showed; None where that is not known.
     detections
@@ -276,7 +275,7 @@ class Overview:
     troubles: tuple[Issue, ...]
     series: dict[str, dict[str, tuple[Array, Array]]]
     above: tuple[Array, str] | None
-    vibration: tuple[Vibration, Array] | None
+    vibration: tuple[Array, Array] | None
     coverage: Coverage | None
     detections: tuple[int, int, int]
     lost: tuple[Recovered, ...]
@@ -407,7 +406,7 @@ def _path(flight: Flight, source: str | None) -> Path | None:
 
 
 def _troubles(
-    flight: Flight, source: str | None, streams: dict[str, Pace], vibration: tuple[Vibration, Array] | None
+    flight: Flight, source: str | None, streams: dict[str, Pace], vibration: tuple[Array, Array] | None
 ) -> list[Issue]:
     found: dict[str, Array] = {}
     nav = flight.nav.get(source) if source is not None else None
@@ -425,14 +424,14 @@ def _troubles(
             if len(t):
                 found[TROUBLES[4]] = runs_of(sd[:, 0] > UNSURE * np.median(sd), t)
     if vibration is not None:
-        found[TROUBLES[5]] = runs_of(vibration[0].worst > FINE, vibration[1])
+        found[TROUBLES[5]] = runs_of(vibration[0].max(axis=1) > FINE, vibration[1])
     if "imu" in streams:
         found["no inertial samples"] = streams["imu"].gaps
     return [Issue(what, found[what]) for what in TROUBLES if len(found.get(what, ()))]
 
 
 def _series(flight: Flight) -> dict[str, dict[str, tuple[Array, Array]]]:
-    height, speed, attitude, turning = {}, {}, {}, {}
+    height, speed, attitude = {}, {}, {}
     for name, nav in flight.nav.items():
         t, place = ordered(nav, POSITION)
         if not len(t):
@@ -453,11 +452,7 @@ def _series(flight: Flight) -> dict[str, dict[str, tuple[Array, Array]]]:
             t, v = ordered(flight.gnss, VELOCITY, gnss_times(flight))
             if len(t):
                 speed["satellites"] = t, np.hypot(v[:, 0], v[:, 1])
-    if flight.imu is not None:
-        t, w = ordered(flight.imu, RATE)
-        if len(t):
-            turning["inertial sensor"] = t, np.degrees(w)
-    return {"height": height, "speed": speed, "attitude": attitude, "turning": turning}
+    return {"height": height, "speed": speed, "attitude": attitude}
 
 
 def _above(flight: Flight, path: Path | None) -> tuple[Array, str] | None:
@@ -470,7 +465,7 @@ def _above(flight: Flight, path: Path | None) -> tuple[Array, str] | None:
     return None if level is None else (level[0] - path.place[:, 2], level[1])
 
 
-def _vibration(flight: Flight) -> tuple[Vibration, Array] | None:
+def _vibration(flight: Flight) -> tuple[Array, Array] | None:
     if flight.imu is None or flight.manifest.time.kind != "utc":
         return None
     t, force = ordered(flight.imu, FORCE)

@@ -275,11 +275,12 @@ def gains_of(overview: Overview, numbers: Numbers) -> list[Gain]:
     list of Gain
     """
     data = (Gain(one.key, (), one.lost, one.of, one.share, one.what, one.why) for one in overview.lost)
-    found = [*_metres(numbers), *data]
+    found = [*metric_gains(numbers), *data]
     return sorted((one for one in found if one.share >= LISTED), key=lambda one: -one.share)
 
 
-def _metres(numbers: Numbers) -> Iterable[Gain]:
+def metric_gains(numbers: Numbers) -> Iterable[Gain]:
+    """What taking errors off gains, metres; parameters as of `gains_of`."""
     gain, left = numbers.get(("gain", "winner")), error_left(numbers)
     if gain is not None and left is not None and _known(gain["value"]):
         before = gain["value"] + left

@@ -133,8 +133,9 @@ def _track(one: Tracked) -> Figure:
     called = {"schmidt": "Schmidt-Kalman", "ekf": "extended Kalman", "kf": "Kalman"}
     known = np.isfinite(one.truth).any()
     truth = one.truth if known else one.estimate
-    title = "Track and truth" if known else "Track"
-    return track_map(truth, {one.filter: one.estimate}, called, title, measured=one.measured)
+    fig = track_map(truth, {one.filter: one.estimate}, called, measured=one.measured)
+    fig.axes[0].set_title("Track and truth" if known else "Track")
+    return fig
 
 
 def _navigation(one: Navigation) -> Figure:
@@ -145,8 +146,9 @@ def _navigation(one: Navigation) -> Figure:
     bounds = {one.source: sd} if np.isfinite(sd).any() else {}
     part = (one.errors.times >= one.part[1]) & (one.errors.times < one.part[2])
     bounds = {name: values[part] for name, values in bounds.items()}
-    title = f"Attitude against {one.reference}"
-    return error_bands(one.errors.times[part], {one.source: error[part]}, bounds, axes, title)
+    fig = error_bands(one.errors.times[part], {one.source: error[part]}, bounds, axes)
+    fig.axes[0].set_title(f"Attitude against {one.reference}")
+    return fig
 
 
 def _consistency(one: Consistency) -> Figure:

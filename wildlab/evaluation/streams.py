@@ -8,7 +8,6 @@ filtered before it was thinned, mirrored into lower bands.
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -148,8 +147,6 @@ def runs_of(mask: ArrayLike, stamps: ArrayLike) -> Array:
     return np.stack([t[begin], t[np.minimum(end, len(t) - 1)]], axis=1)
 
 
-#: Edges of the bands, Hz: what steers an aircraft is below the first one.
-EDGES = (1.0, 5.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
 #: What is shaking and not flying, and what is smoothed over, Hz.
 FLOOR_HZ, SMOOTH_HZ = 5.0, 2.0
 #: Limits of ArduPilot's documentation ("Measuring Vibration"), m/s^2: below the first it is usually fine,
@@ -157,38 +154,10 @@ FLOOR_HZ, SMOOTH_HZ = 5.0, 2.0
 FINE, HARMFUL = 30.0, 60.0
 #: Below this rate (Hz) nothing above the floor is left to see, and so few samples tell nothing.
 LEAST_HZ, FEWEST = 20.0, 200
-#: Samples of one spectrum.
-SEGMENT = 1024
 
 
-class Vibration(NamedTuple):
-    """What an accelerometer (N, 3) shows of shaking.
-
-    Attributes
-    ----------
-    rate_hz
-        Of the samples; nothing above half of it is in them.
-    bands
-        (B, 2) Hz.
-    rms
-        (B, 3) m/s^2, of each axis in each band.
-    level
-        (N, 3) m/s^2 over time, the measure of the limits.
-    """
-
-    rate_hz: float
-    bands: Array
-    rms: Array
-    level: Array
-
-    @property
-    def worst(self) -> Array:
-        """(N,) m/s^2, of the axis that shakes most at the time."""
-        return np.asarray(self.level.max(axis=1))
-
-
-def vibration_of(stamps: ArrayLike, force: ArrayLike) -> Vibration | None:
-    """How much a sensor shakes.
+def vibration_of(stamps: ArrayLike, force: ArrayLike) -> Array | None:
+    """How much a sensor shakes over time, m/s^2, by the measure of the limits.
 
     Parameters
     ----------
@@ -199,42 +168,26 @@ def vibration_of(stamps: ArrayLike, force: ArrayLike) -> Vibration | None:
 
     Returns
     -------
-    Vibration or None
-        None where the samples are too few or too slow to tell.
+    (N, 3) array or None
+        Of each axis; None where the samples are too few or too slow to tell.
 
     Examples
     --------
-    A sine of 40 Hz and 10 m/s^2 about one axis has a root mean square of 7.1 m/s^2:
+    A sine of 40 Hz and 10 m/s^2 along one axis, whose root mean square is 7.1 m/s^2:
 
     >>> t = np.arange(0, 20, 1 / 200)
     >>> found = vibration_of(t, np.stack([10 * np.sin(2 * np.pi * 40 * t), 0 * t, 0 * t], axis=1))
-    >>> found.bands[np.argmax(found.rms[:, 0])].tolist(), round(float(found.rms[:, 0].max()), 1)
-    ([20.0, 50.0], 7.1)
-    >>> round(float(np.median(found.worst)), 1)
+    >>> round(float(np.median(found[:, 0])), 1)
     6.5
     """
-    from scipy.signal import welch  # brings scipy.stats along, which takes long
-
     t, f = np.asarray(stamps, float), np.asarray(force, float)
     if len(t) < FEWEST:
         return None
     rate = 1 / float(np.median(np.diff(t)))
     if not rate >= LEAST_HZ:
         return None
-    top = rate / 2
-    edges = [edge for edge in EDGES if edge < top] + [top]
-    bands = np.array(list(pairwise(edges)))
-    length = min(SEGMENT, len(t))
-    frequency, density = welch(f, rate, nperseg=length, axis=0)
-    width = frequency[1] - frequency[0]
-    rms = np.array(
-        [
-            np.sqrt((density[(frequency >= low) & (frequency < high)] * width).sum(axis=0))
-            for low, high in bands
-        ]
-    )
     shaken = (f - _smoothed(f, FLOOR_HZ, rate)) ** 2
-    return Vibration(rate, bands, rms, np.sqrt(np.maximum(_smoothed(shaken, SMOOTH_HZ, rate), 0)))
+    return np.asarray(np.sqrt(np.maximum(_smoothed(shaken, SMOOTH_HZ, rate), 0)))
 
 
 def _smoothed(values: Array, cut_hz: float, rate_hz: float) -> Array:

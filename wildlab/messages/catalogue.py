@@ -208,9 +208,7 @@ def load_texts(page: str, folder: Path = FOLDER) -> PageTexts:
     tables: dict[str, type] = {"figure": FigureText, "table": TableText}
     plain = {"subtitle", "limits", "method", "answer", "subject", "quantity"}
     if unknown := sorted(set(content) - plain - set(lists) - set(tables)):
-        raise WildlabError(
-            f"a page has no {unknown[0]!r}", "see the texts of another page", file=path, field=unknown[0]
-        )
+        raise WildlabError(f"a page has no {unknown[0]!r}", "leave it out", file=path, field=unknown[0])
     try:
         return PageTexts(
             content.get("subtitle", ""),
@@ -318,7 +316,7 @@ def load_language(language: str | Path = ENGLISH) -> Language:
     if not isinstance(code, str) or not _CODE.fullmatch(code) or not isinstance(name, str):
         raise WildlabError(
             f"the language has the code {code!r}" if isinstance(name, str) else "the language has no name",
-            'begin the file with [language], code = "sw" (ISO 639) and name = "Kiswahili"',
+            'begin with [language], code = "sw" and name = "Kiswahili"',
             file=path,
             field="language",
         )
@@ -351,7 +349,7 @@ def _check(key: str, text: Any, english: Any, path: Path) -> None:
     if isinstance(english, Mapping):
         if not isinstance(text, Mapping) or set(text) != set(english):
             wanted = ", ".join(f'{one} = "..."' for one in english)
-            raise refuse("this text depends on how many, or on what is known", f"give it as {{{wanted}}}")
+            raise refuse("this text has variants", f"give it as {{{wanted}}}")
         pairs = [(text[variant], english[variant], variant) for variant in english]
     elif isinstance(english, tuple):
         if not isinstance(text, tuple) or len(text) != len(english):

@@ -158,17 +158,6 @@ def length(metres: float) -> str:
     return f"{metres:.2f} m" if metres < 1 else f"{metres:.1f} m" if metres < 10 else f"{metres:.0f} m"
 
 
-def fine_length(metres: float) -> str:
-    """Metres with a decimal below a hundred.
-
-    Examples
-    --------
-    >>> fine_length(6.72), fine_length(113.0), fine_length(3420.0)
-    ('6.7 m', '113 m', '3.4 km')
-    """
-    return f"{metres:.1f} m" if metres < 100 else way_length(metres)
-
-
 def way_length(metres: float) -> str:
     """The length of a path.
 

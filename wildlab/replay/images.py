@@ -5,7 +5,8 @@ The pixels alone are kept: an image is decoded and written anew, so nothing else
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,29 +18,18 @@ from wildlab.errors import WildlabError
 from wildlab.flight.readers.frames import Frame, open_frames
 from wildlab.flight.readers.frames.image import file_name, frame_name
 
-#: Bytes of all images, and images, at most; the longest side, px.
-MOST_BYTES, MOST_IMAGES, LONGEST = 24_000_000, 1000, 960
-#: What a pixel takes in a JPEG that looks well, bytes: it decides how far images are reduced.
-PER_PIXEL = 0.15
-#: Qualities that are tried until an image is small enough.
-QUALITIES = (80, 65, 50, 35, 20)
+#: Pictures of a page and their bytes, at most: below 3 MB a phone opens it at once; the longest side, px.
+MOST_PICTURES, MOST_BYTES, LONGEST, QUALITY = 120, 800_000, 960, 70
 #: Shares of the pixels, %, that are black and white where counts or temperatures are made grey.
 DARK, BRIGHT = 0.5, 99.8
 #: By how much the shape of an image may differ from that of the camera's, as a share.
 UNLIKE = 0.01
 
 
-class Shot(NamedTuple):
-    """A picture of a frame: JPEG, and its pixels for one of the frame's."""
-
-    jpeg: bytes
-    scale: float
-
-
 class Shots(NamedTuple):
-    """Pictures by the row of the frames that they are of, and clauses on those that are not shown."""
+    """JPEG by the row of the frames that they are of, and clauses on those that are not shown."""
 
-    by_row: dict[int, Shot]
+    by_row: dict[int, bytes]
     lacks: tuple[str, ...]
 
 
@@ -47,9 +37,10 @@ def read_shots(
     folder: Path,
     ids: Sequence[object],
     size: tuple[int, int] | None,
+    seen: Collection[int] = (),
     progress: Callable[[int, int], None] = lambda done, of: None,
 ) -> Shots:
-    """Pictures of a flight's frames.
+    """Pictures of a flight's frames; of too many half evenly, half where something was seen.
 
     Parameters
     ----------
@@ -59,12 +50,10 @@ def read_shots(
         (N,) what the flight calls its frames: names of files, with or without their endings.
     size
         Width and height of the camera's image, px, where it is known: images of another shape are not shown.
+    seen
+        Rows of the frames in which something was seen.
     progress
         Is told how many are done, of how many.
-
-    Returns
-    -------
-    Shots
 
     Raises
     ------
@@ -72,11 +61,9 @@ def read_shots(
         Where the folder is not there, or holds no image of these frames.
     """
     frames = open_frames(folder, ids=[str(one) for one in ids])
-    names: Iterable[str]
-    if frames.files:
-        names = [file_name(path) for path in frames.files]
-    else:
-        names = [frame_name(folder, number) for number in range(frames.count or 0)]
+    names: Iterable[str] = map(file_name, frames.files)
+    if not frames.files:
+        names = (frame_name(folder, number) for number in range(frames.count or 0))
     rows = {str(name): row for row, name in reversed(list(enumerate(ids)))}
     stems = {Path(name).stem: row for name, row in reversed(list(rows.items()))}
     found = [(number, rows.get(name, stems.get(Path(name).stem))) for number, name in enumerate(names)]
@@ -84,46 +71,30 @@ def read_shots(
     if not numbers:
         raise WildlabError(
             "none of these images is one of the flight's frames",
-            "name the folder of the images that the flight was imported with",
+            "name the folder of its images",
             file=folder,
             field="--images",
         )
-    lacks = []
-    wanted = sorted(numbers)
-    if len(wanted) > MOST_IMAGES:
-        lacks.append(f"every image: {MOST_IMAGES} of {len(wanted)} are, evenly")
-        wanted = [wanted[i] for i in np.linspace(0, len(wanted) - 1, MOST_IMAGES).round().astype(int)]
-    taken: dict[int, Shot] = {}
-    amiss: dict[str, int] = {}
-    scale: float | None = None
-    for done, (number, frame) in enumerate(zip(wanted, frames.some(wanted), strict=False)):
-        why = _why_not(frame, size)
-        if why:
-            amiss[why] = amiss.get(why, 0) + 1
+    lacks, wanted = [], np.array(sorted(numbers))
+    if len(wanted) > MOST_PICTURES:
+        near, half = wanted[[numbers[int(one)] in seen for one in wanted]], MOST_PICTURES // 2
+        kept = np.union1d(wanted[spread_evenly(len(wanted), half)], near[spread_evenly(len(near), half)])
+        lacks.append(f"every image: {len(kept)} of {len(wanted)} are")
+        wanted = kept
+    taken: dict[int, bytes] = {}
+    amiss: Counter[str] = Counter()
+    for done, (number, frame) in enumerate(zip(wanted, frames.some(list(wanted)), strict=False), start=1):
+        if why := _why_not(frame, size):
+            amiss[why] += 1
         else:
-            wide = size[0] if size is not None else frame.image.shape[1]
-            high = size[1] if size is not None else frame.image.shape[0]
-            scale = scale or reduction(wide, high, len(wanted))
-            taken[numbers[number]] = Shot(
-                jpeg_of(frame, (round(wide * scale), round(high * scale)), MOST_BYTES // len(wanted)), scale
-            )
-        progress(done + 1, len(wanted))
-    lacks += [f"{count} images: {why}" for why, count in amiss.items()]
-    return Shots(taken, tuple(lacks))
+            taken[numbers[int(number)]] = jpeg_of(frame, MOST_BYTES // len(wanted))
+        progress(done, len(wanted))
+    return Shots(taken, (*lacks, *(f"{count} images: {why}" for why, count in amiss.items())))
 
 
-def reduction(width: int, height: int, count: int) -> float:
-    """By what images are made smaller so that `count` of them fit into `MOST_BYTES`; one at most.
-
-    Examples
-    --------
-    >>> reduction(640, 512, 10)
-    1.0
-    >>> round(reduction(4000, 3000, 10), 2)
-    0.24
-    """
-    pixels = MOST_BYTES / max(count, 1) / PER_PIXEL
-    return min(1.0, LONGEST / max(width, height), float(np.sqrt(pixels / (width * height))))
+def spread_evenly(n: int, most: int) -> NDArray[np.intp]:
+    """Rows of ``n``, all or ``most`` of them evenly, the first and the last among them."""
+    return np.arange(n) if n <= most else np.unique(np.linspace(0, n - 1, most).round().astype(np.intp))
 
 
 def _why_not(frame: Frame, size: tuple[int, int] | None) -> str:
@@ -135,19 +106,18 @@ def _why_not(frame: Frame, size: tuple[int, int] | None) -> str:
     return ""
 
 
-def jpeg_of(frame: Frame, size: tuple[int, int], most: int) -> bytes:
-    """A frame as JPEG of a width and height, of as good a quality as `most` bytes allow."""
+def jpeg_of(frame: Frame, most: int) -> bytes:
+    """A frame as JPEG of about so many bytes at most, with fewer pixels where it has to."""
     image = frame.image if frame.unit in ("grey", "colour") else stretch_contrast(frame.image)
-    if image.ndim == 3:
-        image = image[..., ::-1]
-    if (image.shape[1], image.shape[0]) != size:
-        image = cv2.resize(np.ascontiguousarray(image), size, interpolation=cv2.INTER_AREA)
-    packed = b""
-    for quality in QUALITIES:
-        _, data = cv2.imencode(".jpg", np.ascontiguousarray(image), [cv2.IMWRITE_JPEG_QUALITY, quality])
-        packed = data.tobytes()
+    image = np.ascontiguousarray(image[..., ::-1] if image.ndim == 3 else image)
+    share, packed = min(1.0, LONGEST / max(image.shape[:2])), b""
+    for _ in range(3):
+        size = [max(round(side * share), 1) for side in image.shape[1::-1]]
+        small = image if share == 1 else cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+        packed = cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1].tobytes()
         if len(packed) <= most:
             break
+        share *= 0.95 * float(np.sqrt(most / len(packed)))
     return packed
 
 

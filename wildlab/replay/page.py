@@ -20,10 +20,10 @@ from numpy.typing import ArrayLike
 
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.flight.clocks import longest_gap
+from wildlab.geometry.covariances import ellipse_axes
 from wildlab.geometry.frames import Indices
-from wildlab.replay.images import Shot
+from wildlab.replay.images import spread_evenly
 from wildlab.replay.scene import (
-    SHARE,
     Array,
     Estimates,
     Points,
@@ -32,14 +32,12 @@ from wildlab.replay.scene import (
     minutes,
     plain,
     relief,
-    spread_evenly,
 )
 from wildlab.reporting.figures import colour, filter_words
 from wildlab.reporting.text import TEMPLATES, render
 
-#: Pictures and their bytes in a page, rows of points and of a way, and detections in images, at most: below
-#: 3 MB a phone opens it at once.
-MOST_PICTURES, PICTURE_BYTES, MOST_ROWS, MOST_SEEN = 120, 800_000, 3000, 10_000
+#: Rows of points and of a way, and detections in images, at most.
+MOST_ROWS, MOST_SEEN = 3000, 10_000
 #: What the browser may do: run the script with this hash, and show what is in the file.
 POLICY = (
     "default-src 'none'; script-src 'sha256-{script}'; style-src 'sha256-{style}'; img-src data:; "
@@ -47,7 +45,7 @@ POLICY = (
 )
 
 
-def page(scene: ReplayScene, shots: Mapping[int, Shot]) -> str:
+def page(scene: ReplayScene, shots: Mapping[int, bytes]) -> str:
     """One HTML file with all of it inside.
 
     Parameters
@@ -99,7 +97,7 @@ def _filters(scene: ReplayScene) -> dict[str, str]:
     return {filter_words(plain(one.filter)): colour(one.filter) for one in scene.tracks}
 
 
-def drawn(scene: ReplayScene, shots: Mapping[int, Shot]) -> dict[str, Any]:
+def drawn(scene: ReplayScene, shots: Mapping[int, bytes]) -> dict[str, Any]:
     """What the page's script draws, as plain values: metres north and east, seconds, pixels; None: not known.
 
     Parameters
@@ -110,7 +108,6 @@ def drawn(scene: ReplayScene, shots: Mapping[int, Shot]) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``ellipses`` are as `ellipse_axes` gives them.
     """
     low, high = scene.extent
     found: dict[str, Any] = {
@@ -133,9 +130,9 @@ def drawn(scene: ReplayScene, shots: Mapping[int, Shot]) -> dict[str, Any]:
         # Every other place of a border: its corners, and the middles of its sides.
         found["frames"] = {
             "t": _rounded(scene.views.times, 3),
-            "outlines": _rounded(scene.views.outlines[:, ::2, :2], 1),
+            "outlines": _rounded(scene.views.outlines[:, ::2], 1),
         }
-        found["pictures"] = _pictures(scene, shots)
+        found["pictures"] = [[row, _address("jpeg", shots[row])] for row in sorted(shots)]
     if scene.camera is not None:
         found["size"] = [scene.camera.width, scene.camera.height]
     if scene.sightings is not None:
@@ -164,61 +161,23 @@ def _way(times: Array, places: Array, rows: Indices) -> dict[str, Any]:
 def _judged(of: Points | Estimates, most: int) -> dict[str, Any]:
     rows = spread_evenly(len(of.times), most)
     return _way(of.times, of.places, rows) | {
-        "ellipses": _rounded(ellipse_axes(of.covariance[rows])),
+        "ellipses": _rounded(_ellipses(of.covariance[rows])),
         "error": _rounded(of.error[rows]),
         "nees": _rounded(of.nees[rows]),
     }
 
 
-def ellipse_axes(covariance: Array) -> Array:
-    """Half axes and turn of the ellipses that hold `SHARE` of a normal distribution.
-
-    Parameters
-    ----------
-    covariance
-        (N, 2, 2) m^2, north before east; may be NaN.
-
-    Returns
-    -------
-    (N, 3): longer and shorter half axis, m, and the angle of the longer one from the east, clockwise, rad;
-    NaN where the covariance is.
-    """
-    known = np.isfinite(covariance).all(axis=(1, 2))
-    values, vectors = np.linalg.eigh(covariance[known])
-    found = np.full((len(covariance), 3), np.nan)
-    size = np.sqrt(-2.0 * np.log(1.0 - SHARE) * np.maximum(values, 0.0))
-    north, east = vectors[:, 0, 1], vectors[:, 1, 1]
-    found[known] = np.column_stack([size[:, 1], size[:, 0], np.arctan2(-north, east)])
-    return found
-
-
-def _pictures(scene: ReplayScene, shots: Mapping[int, Shot]) -> list[list[Any]]:
-    """Row of the frame and address of its picture: of too many half evenly, half where something was seen."""
-    rows = np.array(sorted(shots), int)
-    if len(rows) > MOST_PICTURES:
-        seen = rows[np.isin(rows, [] if scene.sightings is None else scene.sightings.frame)]
-        half = MOST_PICTURES // 2
-        rows = np.union1d(rows[spread_evenly(len(rows), half)], seen[spread_evenly(len(seen), half)])
-    most = PICTURE_BYTES // max(len(rows), 1)
-    return [[int(row), _address("jpeg", smaller(shots[row].jpeg, most))] for row in rows]
-
-
-def smaller(jpeg: bytes, most: int) -> bytes:
-    """A picture of about so many bytes at most, with fewer pixels where it has to."""
-    if len(jpeg) <= most:
-        return jpeg
-    image = np.asarray(cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_UNCHANGED))
-    share = float(np.sqrt(most / len(jpeg)))
-    size = [max(round(side * share), 1) for side in image.shape[1::-1]]
-    image = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
-    return cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 65])[1].tobytes()
+def _ellipses(covariance: Array) -> Array:
+    """(N, 3) longer and shorter half axis, m, and turn of the longer one from the east, clockwise, rad."""
+    long_axis, short_axis, bearing = ellipse_axes(covariance)
+    return np.column_stack([long_axis, short_axis, bearing - np.pi / 2])
 
 
 def _ground(scene: ReplayScene) -> dict[str, Any]:
     """Terrain as a shaded picture, and the places of its south-western and north-eastern corners."""
     assert scene.terrain is not None  # noqa: S101 - for the type checker
     south, north, west, east = scene.terrain.extent
-    h, shades, _ = relief(scene.terrain.height, scene.terrain.step)
+    h, shades = relief(scene.terrain.height, scene.terrain.step)
     clear = np.where(np.isfinite(h), 255, 0).astype(np.uint8)
     picture = np.dstack([shades[..., ::-1], clear])[::-1]
     png = cv2.imencode(".png", np.ascontiguousarray(picture))[1].tobytes()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import unicodedata
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -12,15 +11,14 @@ from numpy.typing import NDArray
 
 from wildlab.analysis.evaluate import score_points
 from wildlab.analysis.georeference import covariances_of, georeference, observe
-from wildlab.analysis.image_coverage import FLATTEST, POSITION, ground_height, ordered
+from wildlab.analysis.image_coverage import POSITION, cover_images, ground_height, ordered
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import position_nees
-from wildlab.flight.clocks import frame_times, gimbal_angles, poses_at
+from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.georeference import georeference_pixels, pixel_rays
-from wildlab.geometry.terrain import Terrain, pixels_to_terrain
+from wildlab.geometry.terrain import Terrain
+from wildlab.replay.images import spread_evenly
 
 #: Letters of a name that are shown, at most.
 MOST_LETTERS = 60
@@ -34,13 +32,8 @@ def plain(name: str) -> str:
     >>> plain("boat\\n\\u202egnp.exe")
     'boat gnp.exe'
     """
-    kept = "".join(" " if one.isspace() else one for one in name if one.isspace() or _visible(one))
-    short = " ".join(kept.split())
+    short = " ".join("".join(one if one.isprintable() else " " for one in name).split())
     return short if len(short) <= MOST_LETTERS else f"{short[: MOST_LETTERS - 1]}…"
-
-
-def _visible(letter: str) -> bool:
-    return not unicodedata.category(letter).startswith("C")
 
 
 def minutes(seconds: float) -> str:
@@ -51,10 +44,8 @@ def minutes(seconds: float) -> str:
 
 Array = NDArray[np.float64]
 Names = NDArray[np.object_]
-#: Corners of an ellipse, and vertices of the ground along its longer side at most.
-CORNERS, MOST_NODES = 32, 200
-#: Of a normal distribution that an ellipse holds.
-SHARE = 0.9
+#: Nodes of the ground along its longer side, at most.
+MOST_NODES = 200
 
 
 class Path(NamedTuple):
@@ -66,7 +57,7 @@ class Path(NamedTuple):
 
 
 class Views(NamedTuple):
-    """The frames of the camera, in the order of time. NaN where a pose or a footprint is not known.
+    """The frames of the camera, in the order of time.
 
     Attributes
     ----------
@@ -74,16 +65,12 @@ class Views(NamedTuple):
         (N,) what the flight calls them; never shown.
     times
         (N,) s.
-    p_nc, R_nc
-        (N, 3) m, (N, 3, 3): the camera's pose; takes a vector from c to n.
     outlines
-        (N, B, 3) m, the border of each image on the ground, in order, not closed.
+        (N, B, 2) m, the border of each image on the ground, in order, not closed; NaN where it is not known.
     """
 
     ids: Names
     times: Array
-    p_nc: Array
-    R_nc: Array
     outlines: Array
 
 
@@ -194,18 +181,12 @@ class ReplayScene:
 
     @property
     def extent(self) -> tuple[Array, Array]:
-        """The least and the greatest north, east and down of what is shown, (3,) m each; the sea not."""
-        parts = [np.empty((0, 3))]
-        parts += [self.path.places] if self.path is not None else []
-        parts += [self.views.outlines.reshape(-1, 3)] if self.views is not None else []
-        parts += [self.points.places] if self.points is not None else []
-        parts += [one.places for one in self.tracks]
-        parts += [one.places for one in self.truth]
-        known = np.concatenate(parts)
+        """The least and the greatest north and east of what is shown, (2,) m each."""
+        parts = [] if self.views is None else [self.views.outlines.reshape(-1, 2)]
+        parts += [one.places[:, :2] for one in (self.path, self.points, *self.tracks, *self.truth) if one]
+        known = np.concatenate([np.empty((0, 2)), *parts])
         known = known[np.isfinite(known).all(axis=1)]
-        if not len(known):
-            return np.full(3, -50.0), np.full(3, 50.0)
-        return known.min(axis=0), known.max(axis=0)
+        return (known.min(axis=0), known.max(axis=0)) if len(known) else (np.full(2, -50.0), np.full(2, 50.0))
 
 
 def heights(scene: ReplayScene) -> Array:
@@ -229,31 +210,7 @@ def heights(scene: ReplayScene) -> Array:
     return np.asarray(up + (scene.ground if np.isfinite(scene.ground) else 0.0))
 
 
-def ellipse_rings(places: Array, covariance: Array) -> Array:
-    """The ellipses about points on the ground that hold `SHARE` of a normal distribution.
-
-    Parameters
-    ----------
-    places
-        (N, 3) m in n.
-    covariance
-        (N, 2, 2) m^2, north before east.
-
-    Returns
-    -------
-    (N, CORNERS + 1, 3) m in n, closed.
-    """
-    size = float(np.sqrt(-2.0 * np.log(1.0 - SHARE)))  # the chi-square with two degrees of freedom
-    values, vectors = np.linalg.eigh(covariance)
-    turn = np.linspace(0.0, 2 * np.pi, CORNERS + 1)
-    circle = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
-    ring = np.einsum("nij,kj->nki", vectors * (size * np.sqrt(np.maximum(values, 0.0)))[:, None, :], circle)
-    rings = np.repeat(places[:, None, :], len(turn), axis=1)
-    rings[..., :2] += ring
-    return rings
-
-
-def relief(height: NDArray[np.float32], step: float) -> tuple[Array, NDArray[np.uint8], Array]:
+def relief(height: NDArray[np.float32], step: float) -> tuple[Array, NDArray[np.uint8]]:
     """Terrain thinned to `MOST_NODES` along its longer side, shaded from the north-west.
 
     Parameters
@@ -265,8 +222,8 @@ def relief(height: NDArray[np.float32], step: float) -> tuple[Array, NDArray[np.
 
     Returns
     -------
-    heights, colours, normals
-        (r, c) m, (r, c, 3) and (r, c, 3) east, north, up.
+    heights, colours
+        (r, c) m and (r, c, 3).
     """
     every = max(1, -(-max(height.shape) // MOST_NODES))
     h = np.asarray(height[::every, ::every], float)
@@ -276,45 +233,11 @@ def relief(height: NDArray[np.float32], step: float) -> tuple[Array, NDArray[np.
     light = normals @ (np.array([-1.0, 1.0, 1.2]) / np.linalg.norm([-1.0, 1.0, 1.2]))
     tone = np.clip(0.75 + 0.5 * (light - np.median(light)), 0.45, 1.0)
     colours = (tone[..., None] * np.array([222, 226, 206])).clip(0, 255).astype(np.uint8)
-    return h, colours, normals
-
-
-def mesh(
-    height: NDArray[np.float32], north: float, east: float, step: float
-) -> tuple[Array, NDArray[np.uint32], NDArray[np.uint8], Array]:
-    """Terrain as triangles, thinned to `MOST_NODES` along its longer side and shaded from the north-west.
-
-    Parameters
-    ----------
-    height
-        (R, C) m, NaN where nothing is known; rows run north.
-    north, east
-        Of its first node, m.
-    step
-        Between nodes, m.
-
-    Returns
-    -------
-    vertices, triangles, colours, normals
-        (V, 3) m east, north, up; (T, 3); (V, 3); (V, 3). A triangle with an unknown corner is left out.
-    """
-    h, colours, normals = relief(height, step)
-    every = max(1, -(-max(height.shape) // MOST_NODES))
-    rows, columns = h.shape
-    x, y = np.meshgrid(east + every * step * np.arange(columns), north + every * step * np.arange(rows))
-    vertices = np.stack([x, y, np.nan_to_num(h)], axis=-1).reshape(-1, 3)
-    corner = np.arange(rows * columns).reshape(rows, columns)
-    a, b = corner[:-1, :-1].ravel(), corner[:-1, 1:].ravel()
-    c, d = corner[1:, :-1].ravel(), corner[1:, 1:].ravel()
-    triangles = np.concatenate([np.stack([a, b, d], axis=1), np.stack([a, d, c], axis=1)])
-    triangles = triangles[np.isfinite(h.ravel())[triangles].all(axis=1)]
-    return vertices, triangles.astype(np.uint32), colours.reshape(-1, 3), normals.reshape(-1, 3)
+    return h, colours
 
 
 #: More are not shown: a picture on a screen does not have them, and files grow.
 MOST_POSES, MOST_FRAMES, MOST_POINTS = 6000, 3000, 6000
-#: Rays along each side of an image.
-SIDE = 5
 
 
 def scene_of(
@@ -355,8 +278,8 @@ def scene_of(
     truth = _truth(flight, lacks)
     if path is None and views is None and not truth and not tracks:
         raise WildlabError(
-            "there is nothing to play back: neither poses, nor images, nor truth",
-            "add nav/<source>.parquet or frames.parquet; wildlab check says what is there",
+            "there is nothing to play back",
+            "see wildlab check",
             file=flight.folder,
         )
     begin = _first([path, views, *tracks, *truth])
@@ -388,11 +311,6 @@ def _first(parts: list[Path | Views | Estimates | Target | None]) -> float:
     return 0.0
 
 
-def spread_evenly(n: int, most: int) -> NDArray[np.intp]:
-    """Rows of ``n``, all or ``most`` of them evenly, the first and the last among them."""
-    return np.arange(n) if n <= most else np.unique(np.linspace(0, n - 1, most).round().astype(np.intp))
-
-
 def _path(flight: Flight, source: str | None, lacks: list[str]) -> Path | None:
     if source is None:
         lacks.append("the aircraft: the flight has no poses")
@@ -422,30 +340,17 @@ def _views(flight: Flight, source: str | None, lacks: list[str]) -> Views | None
     if not len(rows):
         lacks.append("images: no frame of a camera has a time")
         return None
-    n = len(rows)
-    ids = frames["frame_id"].to_numpy(object)[rows]
-    nothing = Views(ids, times[rows], *_nowhere(n))
-    if source is None or flight.manifest.camera is None:
-        what = "poses" if source is None else "camera"
-        lacks.append(f"what the camera looked at: the flight has no {what}")
-        return nothing
-    try:
-        p, R, _ = poses_at(flight.nav[source], times[rows], list(ids))
-        pan, tilt = (angle[rows] for angle in gimbal_angles(flight))
-    except WildlabError as error:
-        lacks.append(f"what the camera looked at: {error.problem}")
-        return nothing
-    poses = CameraPoses(flight.manifest.geometry_camera(), flight.manifest.geometry_mount(), p, R, pan, tilt)
-    outlines = footprints(flight, poses)
-    unposed = int((~np.isfinite(poses.p_nc).all(axis=1)).sum())
-    open_ended = int((~np.isfinite(outlines).all(axis=(1, 2))).sum()) - unposed
-    if unposed:
-        lacks.append(f"the camera of {unposed} of {n} frames: they have no pose")
-    if open_ended > 0 and (flight.terrain is not None or ground_height(flight) is not None):
-        lacks.append(
-            f"footprints of {open_ended} of {n} frames: part of the image looks past the ground, or nearly so"
-        )
-    return Views(ids, times[rows], poses.p_nc, poses.R_nc, outlines)
+    ids, cover = frames["frame_id"].to_numpy(object)[rows], cover_images(flight, source)
+    if cover is None:
+        lacks.append("what the camera sees of the ground: camera, poses or ground are not known")
+        return Views(ids, times[rows], np.full((len(rows), 4, 2), np.nan))
+    for count, why in (
+        (int((~cover.posed[rows]).sum()), "they have no pose"),
+        (int(cover.flat[rows].sum()), "part of the image looks past the ground, or nearly so"),
+    ):
+        if count:
+            lacks.append(f"footprints of {count} of {len(rows)} frames: {why}")
+    return Views(ids, times[rows], cover.outlines[rows])
 
 
 def _kept_frames(flight: Flight, ids: NDArray[np.object_]) -> NDArray[np.intp]:
@@ -468,55 +373,6 @@ def _of_camera(flight: Flight, frames: pd.DataFrame) -> NDArray[np.bool_]:
     sensors = frames["sensor"].fillna("")
     cameras = set(sensors[frames["frame_id"].isin(set(pixels))])
     return np.asarray(sensors.isin(cameras)) if cameras else np.ones(len(frames), bool)
-
-
-def _nowhere(n: int) -> tuple[Array, Array, Array]:
-    return np.full((n, 3), np.nan), np.full((n, 3, 3), np.nan), np.full((n, 4 * (SIDE - 1), 3), np.nan)
-
-
-def border(width: int, height: int) -> Array:
-    """(4 (SIDE - 1), 2) pixels around an image in order, corners first on each side."""
-    along = np.linspace(0, 1, SIDE)[:-1]
-    low, u, v = -0.5, width - 0.5, height - 0.5
-    sides = [
-        (low + along * (u - low), np.full_like(along, low)),
-        (np.full_like(along, u), low + along * (v - low)),
-        (u - along * (u - low), np.full_like(along, v)),
-        (np.full_like(along, low), v - along * (v - low)),
-    ]
-    return np.concatenate([np.stack(side, axis=1) for side in sides])
-
-
-def footprints(flight: Flight, poses: CameraPoses) -> Array:
-    """The borders of images on the ground of a flight.
-
-    Parameters
-    ----------
-    flight
-        Its terrain is the ground, else a level plane (see `ground_height`).
-    poses
-        Of N images.
-
-    Returns
-    -------
-    (N, B, 3) m in n; NaN for an image of which one ray misses the ground, or meets it flatter than
-    `FLATTEST`, or where the ground is not known.
-    """
-    n, uv = len(poses.p_nc), border(poses.camera.width, poses.camera.height)
-    each, pixels = poses.take(np.repeat(np.arange(n), len(uv))), np.tile(uv, (n, 1))
-    level = ground_height(flight)
-    if flight.terrain is not None:
-        ground = pixels_to_terrain(each, pixels, flight.terrain).points
-    elif level is not None:
-        ground = georeference_pixels(each, pixels, np.full(len(pixels), level[0]))
-    else:
-        return np.full((n, len(uv), 3), np.nan)
-    rays = pixel_rays(poses.camera, pixels, each.R_nc)
-    with np.errstate(invalid="ignore"):
-        steep = rays[:, 2] > np.sin(FLATTEST) * np.linalg.norm(rays, axis=1)
-    outlines = ground.reshape(n, len(uv), 3).copy()
-    outlines[~(steep & np.isfinite(ground).all(axis=1)).reshape(n, -1).all(axis=1)] = np.nan
-    return outlines
 
 
 def _sightings(flight: Flight, views: Views | None, lacks: list[str]) -> Sightings | None:

@@ -14,13 +14,13 @@ from wildlab.messages.catalogue import Message, fill, load_texts
 from wildlab.messages.quantities import NOTHING, area, duration, metres, number, percent, way_length
 from wildlab.names import listed
 from wildlab.paths import DATA
-from wildlab.reporting.charts.drawing import dots_chart
+from wildlab.reporting.charts.drawing import DASHED, Values, rows_chart
+from wildlab.reporting.figures import GREY
 from wildlab.reporting.layout import LIMITS
 from wildlab.reporting.notebook_pages import finished_page
 from wildlab.reporting.own_flights import OwnFlight, pill_of
-from wildlab.reporting.page import TAGS
 from wildlab.reporting.report import Wording, open_report
-from wildlab.reporting.text import csv_link
+from wildlab.reporting.text import TAGS, csv_link
 
 #: Rounding errors of what is zero.
 NO_MORE = 1e-9
@@ -267,7 +267,11 @@ def _figure(
     }
     (words,) = wording.messages([Message("same" if value[least] == value[most] else "span", values)])
     goal = None if quantity.goal is None else scale * quantity.goal
-    chart = dots_chart([name for name, _ in found], value, low, high, f"{quantity.label}{unit}", title, goal)
+    names = [name if len(name) <= 24 else f"{name[:22]}…" for name, _ in found]
+    dots = {"": Values(value, np.array([low, high]))}
+    chart = rows_chart(names, dots, f"{quantity.label}{unit}", size=(4.6, 1.3 + 0.36 * len(names)))
+    if goal is not None:
+        chart.axes[0].axvline(goal, color=GREY, **DASHED)
     return chart, quantity.key.replace("_", "-"), words, words
 
 

@@ -215,8 +215,7 @@ def detections_page(
     if said := wording.messages(advice(result)):
         report.section(names["advice"], part=ADVICE)
         report.points(said)
-    if len(rates := rates_table(result)):
-        wording.table("rates", rates)
+    wording.table("rates", rates_table(result))
     compared = result.get("compared", ())
     if curves is not None and len(compared) > 1:
         _show_compared(wording, compared, curves)

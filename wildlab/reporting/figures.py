@@ -71,14 +71,10 @@ _NARROWEST, _EDGE = 0.7, 8.0
 _ROUNDS = 4
 #: Letters that a line of a title has at least.
 _FEWEST = 10
-#: What stands beside a title, points.
-_BESIDE = 60.0
 #: The space between a number and its unit.
 _UNITS = re.compile(r"(?<=\d) (?=[^\W\d]{1,3}(?:/\w+)?\b|[%°])")
 #: What marks a line's name at its end.
 END_LABEL = "end-label"
-#: Width of a usual letter of a title as a share of its height: what is shorter than that is not measured.
-_NARROW = 0.6
 
 
 def least_size(figure: Figure) -> float:
@@ -114,8 +110,18 @@ def fit_text(figure: Figure) -> None:
         With everything on it.
     """
     _harmless(figure)
-    fit_legends(figure)
-    fit_titles(figure)
+    for legend in list(figure.legends):
+        _narrow(figure, legend)
+    titles = [figure._suptitle, figure._supxlabel]  # type: ignore[attr-defined]
+    titles += [text for axes in figure.get_axes() for text in _names_of(axes)[:-1]]
+    for text in filter(None, titles):
+        _break(text, figure.bbox.width - 2 * _EDGE)
+    # Once is enough but for what stands beside or above much: where its lines change, the panels move.
+    for _ in range(_ROUNDS):
+        lay_out(figure)
+        broken = [_fit(figure, axes, text) for axes in figure.get_axes() for text in _names_of(axes)]
+        if not any(broken):
+            break
     for axes in figure.get_axes():
         names = [text for text in axes.texts if text.get_gid() == END_LABEL and isinstance(text, Annotation)]
         if len(names) > 1:
@@ -166,104 +172,32 @@ class Powers(LogFormatter):
 
 def _apart(names: list[Annotation], points: float) -> None:
     """Move names up and down until none lies on another, in the order in which their lines end."""
-    boxes = {id(name): name.get_window_extent() for name in names}
-    names = sorted(names, key=lambda name: boxes[id(name)].y0 + boxes[id(name)].y1)
-    wanted = np.array([(boxes[id(name)].y0 + boxes[id(name)].y1) / 2 for name in names])
-    heights = np.array([boxes[id(name)].height for name in names])
-    places, least = wanted.copy(), (heights[:-1] + heights[1:]) / 2
-    for _ in range(100):
-        off = False
-        for i, room in enumerate(least):
-            lack = room - (places[i + 1] - places[i])
-            if lack > 0.5:
-                places[i : i + 2] += -lack / 2, lack / 2
-                off = True
-        if not off:
-            break
-    for name, moved in zip(names, (places - wanted) * points, strict=True):
-        name.xyann = (name.xyann[0], name.xyann[1] + float(moved))
+    boxes = [name.get_window_extent() for name in names]
+    order = np.argsort([box.y0 + box.y1 for box in boxes], kind="stable")
+    wanted = np.array([(boxes[k].y0 + boxes[k].y1) / 2 for k in order])
+    heights = np.array([boxes[k].height for k in order])
+    below = np.concatenate([[0.0], np.cumsum((heights[:-1] + heights[1:]) / 2)])
+    places = np.maximum.accumulate(wanted - below) + below
+    for k, moved in zip(order, (places - wanted - (places - wanted).mean()) * points, strict=True):
+        names[k].xyann = (names[k].xyann[0], names[k].xyann[1] + float(moved))
 
 
-def fit_legends(figure: Figure) -> None:
-    """Set legends beside the axes that are wider than the figure in fewer columns.
-
-    Parameters
-    ----------
-    figure
-        With everything on it.
-    """
-    places = {code: name for name, code in Legend.codes.items()}
-    for legend in list(figure.legends):
-        columns = legend._ncols  # type: ignore[attr-defined]
-        outside = getattr(legend, "_outside_loc", None)
-        while columns > 1 and legend.get_window_extent().width > figure.bbox.width:
-            columns -= 1
-            place = places[legend._loc_real]  # type: ignore[attr-defined]
-            texts = [text.get_text() for text in legend.get_texts()]
-            handles = [one for one in legend.legend_handles if one is not None]
-            legend.remove()
-            where: Any = _place(place, outside)
-            legend = figure.legend(handles, texts, loc=where, ncols=columns)
-
-
-def _place(place: str, outside: str | None) -> str:
-    """Where a legend was asked to be: ``lower right``, ``outside lower right`` or ``outside right lower``."""
-    if outside is None:
-        return place
-    vertical = place.split()[0]
-    return f"outside {outside} {vertical}" if outside in ("left", "right") else f"outside {place}"
-
-
-def fit_titles(figure: Figure) -> None:
-    """Break titles and names of axes that are wider than their place onto more lines; they hold data, too.
-
-    Parameters
-    ----------
-    figure
-        With everything on it; it is laid out. A title may go on to the figure's edge, or, where another
-        panel stands to the right, to the end of its own.
-    """
-    beside = _BESIDE * figure.dpi / 72
-    every = [(axes, text, text is axes.yaxis.label) for axes in figure.get_axes() for text in _names_of(axes)]
-    for axes, text, upwards in every:
-        room = (figure.bbox.height if upwards else figure.bbox.width / _columns(axes)) - beside
-        (x0, y0), (x1, y1) = text.get_window_extent().get_points()
-        if (y1 - y0 if upwards else x1 - x0) <= room:
-            continue
-        if not upwards and _columns(axes) == 1 and text.get_horizontalalignment() == "left":
-            # It begins where the axes do, beside their numbers.
-            numbers = axes.yaxis.get_tightbbox()
-            room = figure.bbox.width - 2 * _EDGE - (0.0 if numbers is None else numbers.width)
-            if room < _NARROWEST * figure.bbox.width:
-                room = figure.bbox.width - 2 * _EDGE
-        _break(text, room, upwards)
-    for text in (figure._suptitle, figure._supxlabel):  # type: ignore[attr-defined]
-        if text is not None:
-            _break(text, figure.bbox.width - 2 * _EDGE)
-    # Once is enough but for what stands beside or above much: where its lines change, the panels move.
-    for _ in range(_ROUNDS):
-        lay_out(figure)
-        off = [one for one in every if _leaves(*one)]
-        if not off:
-            return
-        for axes, text, upwards in off:
-            _break(text, _room_of(axes, text, upwards), upwards)
-    lay_out(figure)
+def _narrow(figure: Figure, legend: Legend) -> None:
+    """Set a legend outside of the axes that is wider than the figure in fewer columns."""
+    columns, place = legend._ncols, getattr(legend, "_outside_loc", None)  # type: ignore[attr-defined]
+    while place and columns > 1 and legend.get_window_extent().width > figure.bbox.width:
+        columns -= 1
+        texts = [text.get_text() for text in legend.get_texts()]
+        handles = [one for one in legend.legend_handles if one is not None]
+        legend.remove()
+        where: Any = f"outside {place} center"
+        legend = figure.legend(handles, texts, loc=where, ncols=columns, markerscale=legend.markerscale)
 
 
 def _names_of(axes: Axes) -> list[Text]:
-    """The titles of axes and the names of their sides, where there are any."""
+    """The titles of axes and the names of their sides, that of the ordinate last."""
     titles = (axes.title, axes._left_title, axes._right_title)  # type: ignore[attr-defined]
-    return [text for text in (*titles, axes.xaxis.label, axes.yaxis.label) if text.get_text()]
-
-
-def _leaves(axes: Axes, text: Text, upwards: bool) -> bool:
-    """Whether a text leaves the figure, or, where panels stand side by side, goes on into the next."""
-    (x0, y0), (x1, y1) = text.get_window_extent().get_points()
-    figure, panel = axes.figure.bbox, axes.get_window_extent()
-    if upwards:
-        return bool(y0 < 0 or y1 > figure.y1)
-    return bool(x0 < 0 or x1 > (figure.x1 if _columns(axes) == 1 else panel.x1 + _EDGE))
+    return [*filter(Text.get_text, (*titles, axes.xaxis.label)), axes.yaxis.label]
 
 
 def lay_out(figure: Figure) -> None:
@@ -271,47 +205,54 @@ def lay_out(figure: Figure) -> None:
     engine = figure.get_layout_engine()
     if engine is None:
         figure.draw_without_rendering()
-    else:
+        return
+    engine.execute(figure)
+    # Limits that follow from the shape of a map may have longer numbers than those that were laid out.
+    if any(axes.get_aspect() != "auto" and axes.get_adjustable() == "datalim" for axes in figure.get_axes()):
+        for axes in figure.get_axes():
+            axes.apply_aspect()
         engine.execute(figure)
 
 
-def _room_of(axes: Axes, text: Text, upwards: bool) -> float:
-    """Pixels that a text may take along its lines; a title beside long names on the axis goes over them."""
-    figure, panel = axes.get_figure(root=True), axes.get_window_extent()
-    assert figure is not None  # noqa: S101 - for the type checker
-    edge, alone = figure.bbox.x1 - 4, _columns(axes) == 1
-    if upwards:
-        middle = (panel.y0 + panel.y1) / 2
-        return float(2 * min(middle, figure.bbox.y1 - 4 - middle))
-    if text.get_horizontalalignment() == "left":
-        room = float((edge if alone else panel.x1) - panel.x0)
-        if alone and room < _NARROWEST * figure.bbox.width:
-            text.set_x((_EDGE - panel.x0) / panel.width)
-            room = edge - _EDGE
-        return room
-    middle = (panel.x0 + panel.x1) / 2
-    return float(2 * min(middle, edge - middle) if alone else panel.width)
+def _fit(figure: Figure, axes: Axes, text: Text) -> bool:
+    """Break a title or the name of a side onto more lines where it is longer than its room; whether it was.
+
+    A title may go on to the figure's edge, or, beside another panel, to the end of its own; one beside long
+    names on the axis begins at the figure's edge.
+    """
+    box, panel, before = figure.bbox, axes.get_window_extent(), text.get_text()
+    spec = axes.get_subplotspec()
+    alone, upwards = spec is None or spec.get_gridspec().ncols == 1, text is axes.yaxis.label
+    over = figure._suptitle  # type: ignore[attr-defined]
+    top = box.y1 - (0 if over is None else over.get_window_extent().height)
+    side, low, high, end = (
+        ("height", panel.y0, panel.y1, top) if upwards else ("width", panel.x0, panel.x1, box.x1)
+    )
+    reach = end - 4 if alone or upwards else high
+    if text.get_horizontalalignment() == "left" and not upwards:
+        room = reach - low
+        if alone and text.get_window_extent().width > room < _NARROWEST * box.width:
+            text.set_x((_EDGE - low) / panel.width)
+            room = reach - _EDGE
+    else:
+        middle = (low + high) / 2
+        room = 2 * min(middle, reach - middle)
+    if getattr(text.get_window_extent(), side) > room + 1:
+        _break(text, room, side)
+    return bool(text.get_text() != before)
 
 
-def _break(text: Text, room: float, upwards: bool = False) -> None:
+def _break(text: Text, room: float, side: str = "width") -> None:
     """Set a text on as many lines as it needs to be no longer than ``room``, pixels, along its lines; a
     number stays with its unit."""
     words = _UNITS.sub("\u00a0", text.get_text())
     letters = max(map(len, words.split("\n")))
-    side = "height" if upwards else "width"
     while getattr(text.get_window_extent(), side) > room and letters > _FEWEST:
         letters -= 1
         lines = textwrap.wrap(words, letters, break_long_words=False)
         text.set_text("\n".join(lines).replace("\u00a0", " "))
 
 
-def _columns(axes: Axes) -> int:
-    """How many panels stand side by side where the axes are."""
-    spec = axes.get_subplotspec()
-    return 1 if spec is None else int(spec.get_gridspec().ncols)
-
-
-DPI = 190
 #: What a figure has of the inches that a chart asks for: letters of 10 points then have 11 pixels on a phone,
 #: where 6 inches asked for are 361 pixels.
 WIDTH, HEIGHT = 0.76, 0.82
@@ -545,7 +486,12 @@ def log_band(ax: Axes, low: float, high: float, label: str = "95 % band", *, col
         color="#00664B",
         annotation_clip=False,
     )
-    ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    plain_numbers(ax.yaxis)
+
+
+def plain_numbers(axis: Any) -> None:
+    """Write the numbers of a logarithmic axis out."""
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
 
 def mark_gaps(ax: Axes, times: ArrayLike, longest_s: float) -> int:
@@ -667,33 +613,12 @@ def save_figure(figure: Figure, folder: Path, name: str) -> bytes:
     png = png_bytes(figure)
     (folder / f"{name}.png").write_bytes(png)
     if not os.environ.get(QUICK):
-        with _laid_out(figure), shapes_alone(), mpl.rc_context({"pdf.fonttype": 42}):
+        with _laid_out(figure), mpl.rc_context({"pdf.fonttype": 42}):
             figure.savefig(
                 folder / f"{name}.pdf",
                 metadata={"CreationDate": None, "Producer": None, "Creator": "wildlab"},
             )
     return png
-
-
-#: Tables of a font by which letters are chosen and set beside each other: kerning, ligatures and the like.
-LAYOUT_TABLES = ("GSUB", "GPOS", "GDEF", "kern", "BASE", "JSTF", "MATH")
-
-
-@contextmanager
-def shapes_alone() -> Iterator[None]:
-    """While this holds, fonts are embedded without `LAYOUT_TABLES`.
-
-    In a PDF every letter has its place, so nobody reads them there, and taking them apart is two thirds of
-    the time that a font takes.
-    """
-    from fontTools.subset import Options  # takes a while, and a first look needs none
-
-    usual = Options._drop_tables_default
-    Options._drop_tables_default = [*usual, *LAYOUT_TABLES]
-    try:
-        yield
-    finally:
-        Options._drop_tables_default = usual
 
 
 #: CSS pixels that a phone of 390 has for a figure.

@@ -1,7 +1,7 @@
-"""``reports/index.html``: what this is, a flight that moves, a card a case; and ``partners.html``.
+"""Pages of the folder of reports: ``index.html``, what this is, a flight that moves, a card a case;
+``partners.html``; and ``ledger.html``: every published number and claim, and what became of it here.
 
-The flight is a part of a twin, computed once and kept in ``data/front-flight.json``, since simulating it
-takes seconds. ``python tools/front_flight.py`` makes it again, and a test compares.
+The flight is a part of a twin, simulated and drawn once by ``tools/front_flight.py``.
 """
 
 from __future__ import annotations
@@ -13,44 +13,40 @@ import json
 import re
 from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from markupsafe import Markup
-from numpy.typing import NDArray
 
+from wildlab.evaluation.replication import KINDS, operating_characteristics
+from wildlab.evaluation.shares import HOLDS, MOSTLY, SHARE_VERDICTS, expected_wrong
+from wildlab.messages.catalogue import fill, load_texts
 from wildlab.paths import DATA
-from wildlab.reporting import published_marks as marks
-from wildlab.reporting.animation import (
-    PAUSE_STYLE,
-    Course,
-    Ellipses,
-    Outlines,
-    ShownFlight,
-    animated_flight,
-    with_pause,
-)
+from wildlab.reporting import published_tables as published
 from wildlab.reporting.own_flights import PAGE as FLIGHTS
 from wildlab.reporting.own_flights import OwnFlight, pill_of
-from wildlab.reporting.page import PILLS, TAGS, page
-from wildlab.reporting.published_tables import count_answers
+from wildlab.reporting.published_tables import (
+    LONGEST,
+    PREDICTED,
+    claims_table,
+    count_answers,
+    flights_of,
+    groups_table,
+    published_table,
+    summed_up,
+    tested_on,
+)
 from wildlab.reporting.status import FIRST_LOOK, Case, Number, StudyStatus
-from wildlab.reporting.text import read_style, render
+from wildlab.reporting.text import PILLS, TAGS, page, prose, read_style, render, table_html
 
-Array = NDArray[np.float64]
-
-#: The page beside it that says how to share.
-PARTNERS = "partners.html"
+#: The pages beside it: the ledger, and how to share.
+LEDGER, PARTNERS = "ledger.html", "partners.html"
 #: Cards of own flights at most, the newest first, and bytes that all small pictures may take.
 MOST_FLIGHTS, MOST_PICTURES = 4, 1_200_000
-#: Bytes that the moving picture may take.
-MOST_MOVING = 300_000
-FILE = DATA / "front-flight.json"
-#: Share of a normal distribution that its ellipses hold.
-PROBABILITY = 0.9
-_PARTS = ("path", "footprints", "points", "ellipses", "truth")
+#: Numbers of the moving picture, which lies beside it; share of a normal distribution that its ellipses hold.
+FLIGHT, PROBABILITY = DATA / "front-flight.json", 0.9
 #: Width of a small picture, pixels; how well it is kept, of 100; most pixels of one that is read.
 WIDE, QUALITY, MOST_PIXELS = 440, 60, 40_000_000
 _SUMMARY = re.compile(r'<section\b[^>]*\bclass="summary\b[^>]*>(.*?)</section>', re.S)
@@ -59,75 +55,6 @@ _PICTURE = re.compile(r'<img\b[^>]*\bsrc="data:image/png;base64,([A-Za-z0-9+/=\s
 _ALT = re.compile(r'\balt="([^"]*)"')
 _HEADING = re.compile(r"<h1\b[^>]*>(.*?)</h1>", re.S)
 _TAG = re.compile(r"<[^>]+>")
-
-
-class FrontFlight(NamedTuple):
-    """What is shown, and what it comes to.
-
-    Attributes
-    ----------
-    shown
-        For `wildlab.reporting.animation.animated_flight`.
-    twin
-        Its name.
-    height
-        Mean height of the aircraft above the water, m.
-    """
-
-    shown: ShownFlight
-    twin: str
-    height: float
-
-    @property
-    def seconds(self) -> float:
-        """How long that part of the flight takes, s."""
-        return float(self.shown.path.times[-1] - self.shown.path.times[0])
-
-    @property
-    def images(self) -> int:
-        """Images that show the target in that part of the flight; the file has one more on either side."""
-        return int(self._inside.sum())
-
-    @property
-    def _inside(self) -> NDArray[np.bool_]:
-        times, path = np.zeros(0), self.shown.path.times
-        if self.shown.points is not None:
-            times = self.shown.points.times
-        return np.asarray((times >= path[0]) & (times <= path[-1]))
-
-    @property
-    def off(self) -> float:
-        """Median distance of the position from one image to where the target was, m."""
-        points, (truth,) = self.shown.points, self.shown.truth
-        if points is None:
-            return float("nan")
-        missed = (points.points - _between(truth, points.times))[self._inside]
-        return float(np.median(np.hypot(*missed.T)))
-
-    @property
-    def held(self) -> float:
-        """Share of the instants at which the ellipse holds the target."""
-        from wildlab.geometry.covariances import inside_ellipse
-
-        (ellipses,), (truth,) = self.shown.ellipses, self.shown.truth
-        missed = _between(truth, ellipses.times) - ellipses.centres
-        return float(np.mean(inside_ellipse(missed, ellipses.covariances, PROBABILITY)))
-
-
-def _between(course: Course, times: Array) -> Array:
-    return np.stack([np.interp(times, course.times, course.points[:, axis]) for axis in (0, 1)], axis=1)
-
-
-def load_front_flight() -> FrontFlight:
-    """The kept flight, which ``tools/front_flight.py`` makes."""
-    content = json.loads(FILE.read_text(encoding="utf-8"))
-    path, outlines, points, ellipses, truth = (
-        [np.array(one, float) for one in content[name].values()] for name in _PARTS
-    )
-    shown = ShownFlight(
-        Course(*path), Outlines(*outlines), Course(*points), [Ellipses(*ellipses)], [Course(*truth)]
-    )
-    return FrontFlight(shown, content["twin"], content["height_m"])
 
 
 class Glimpse(NamedTuple):
@@ -197,27 +124,15 @@ def smaller(png: str) -> str:
     if not 0 < width * height <= MOST_PIXELS:
         return ""
     try:
-        picture = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
-        if picture is None or picture.dtype != np.uint8:
+        picture = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR)
+        if picture is None:
             return ""
         tall = max(1, min(round(height * WIDE / width), 2 * WIDE))
-        small = cv2.resize(
-            _on_white(np.asarray(picture, np.uint8)), (WIDE, tall), interpolation=cv2.INTER_AREA
-        )
+        small = cv2.resize(picture, (WIDE, tall), interpolation=cv2.INTER_AREA)
         written, webp = cv2.imencode(".webp", small, [cv2.IMWRITE_WEBP_QUALITY, QUALITY])
     except cv2.error:
         return ""
     return f"data:image/webp;base64,{base64.b64encode(webp.tobytes()).decode('ascii')}" if written else ""
-
-
-def _on_white(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Without what it lets through: figures are drawn for white paper."""
-    if picture.ndim == 2:
-        return np.repeat(picture[:, :, None], 3, axis=2)
-    if picture.shape[2] == 3:
-        return picture
-    opaque = picture[:, :, 3:].astype(np.float32) / 255
-    return np.asarray(np.rint(picture[:, :, :3] * opaque + 255 * (1 - opaque)), np.uint8)
 
 
 class Answer(NamedTuple):
@@ -260,7 +175,7 @@ class Card(NamedTuple):
         if not self.numbers:
             return Markup()
         ratios = sorted(one.ratio for one in self.numbers if one.ratio is not None)
-        return marks.plot(self.numbers, alt=render("strip-alt", ratios=ratios)) + marks.ticks()
+        return published.marks_plot(self.numbers, alt=render("strip-alt", ratios=ratios))
 
 
 def case_cards(studies: Iterable[tuple[StudyStatus, Glimpse]], cases: Sequence[Case] = ()) -> list[Card]:
@@ -290,7 +205,7 @@ def _case_card(shows: str, some: Sequence[tuple[StudyStatus, Glimpse]]) -> Card:
         sentence=answer if alone else "",
         tag="; ".join(dict.fromkeys(study_tag(one) for one, _ in some)),
         answers=[_answer(one, alone=alone) for one, _ in some],
-        numbers=marks.drawable(n for one, _ in some if one.ran for n in one.counted),
+        numbers=published.drawable(n for one, _ in some if one.ran for n in one.counted),
         picture=pictured.picture,
         alt=pictured.alt,
     )
@@ -302,7 +217,7 @@ def _answer(one: StudyStatus, *, alone: bool) -> Answer:
     folder = study.name if one.has_report else ""
     if not one.ran:
         return Answer(name, folder, one.state, "no")
-    found = marks.study_verdict(one)
+    found = published.study_verdict(one)
     return Answer(name, folder, found.word, PILLS[found.level], one.first_look)
 
 
@@ -345,7 +260,6 @@ class Learn(NamedTuple):
 
 def front_page(
     studies: Sequence[StudyStatus],
-    flight: FrontFlight,
     *,
     study_cards: Sequence[Card] = (),
     flight_cards: Sequence[Card] = (),
@@ -361,8 +275,6 @@ def front_page(
     ----------
     studies
         All of them, run or not.
-    flight
-        What moves beside the heading.
     study_cards, flight_cards
         Of cases that were run or tried; of own flights, the newest first.
     flights
@@ -376,13 +288,11 @@ def front_page(
     code
         Which code it was put together by, as HTML.
     """
-    counts, states = count_answers(studies), [one.state for one in studies]
-    alt = render("front-alt", flight=flight)
-    moving = animated_flight(flight.shown, alt=alt, probability=PROBABILITY, most_bytes=MOST_MOVING)
+    states = [one.state for one in studies]
     body = render(
         "front",
-        moving=Markup(with_pause(moving)),  # noqa: S704 - HTML
-        flight=flight,
+        moving=Markup(FLIGHT.with_suffix(".svg").read_text("utf-8")),  # noqa: S704 - ours
+        flight=json.loads(FLIGHT.read_text("utf-8")),
         probability=PROBABILITY,
         done=states.count("done"),
         looks=states.count(FIRST_LOOK),
@@ -395,14 +305,14 @@ def front_page(
         waiting=[one.study for one in studies if one.state == "not run"],
         learn=learn,
         checkout=checkout,
-        close=marks.CLOSE,
-        legend=marks.legend(n for one in study_cards for n in one.numbers),
-        headline=marks.headline(counts),
-        counts=counts,
-        pages={"flights": FLIGHTS, "partners": PARTNERS, "ledger": marks.LEDGER},
+        close=published.MARGIN,
+        legend=published.marks_legend(n for one in study_cards for n in one.numbers),
+        # How many studies are done is said above.
+        counts=_tiles(studies)[1:],
+        pages={"flights": FLIGHTS, "partners": PARTNERS, "ledger": LEDGER},
     )
     made = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC") + (f", {code}" if code else "")
-    style = "\n".join((read_style("front"), marks.STYLE, PAUSE_STYLE))
+    style = read_style("front")
     footer = f"<p>{made}. No part of this page asks the network for anything.</p>"
     return page(title="wildlab", body=body, kicker="wildlab", footer=footer, style=style)
 
@@ -430,3 +340,123 @@ def partners_page(reports: Sequence[str]) -> str:
     way = '<a href="index.html">wildlab</a> › for partners'
     body = render("partners", reports=reports, example=example)
     return page(title="A copy that is safe to send", body=body, kicker=way)
+
+
+def ledger_page(studies: Iterable[StudyStatus], *, code: str = "", cases: Sequence[Case] = ()) -> str:
+    """The whole page.
+
+    Parameters
+    ----------
+    studies
+        All of them, run or not.
+    code
+        Which code it was put together by, as HTML.
+    cases
+        Those of the theses, studied here or not.
+    """
+    studies = list(studies)
+    claims = [one for study in studies if study.state == "done" for one in study.claims]
+    decided = [one for one in claims if one.verdict in SHARE_VERDICTS and one.fraction is not None]
+    there = {study.study.case for study in studies}
+    body = render(
+        "ledger",
+        tiles=_tiles(studies),
+        studies=[(one, _tag(one), _in_short(one)) for one in studies],
+        summed_up=summed_up,
+        numbers_table=partial(published_table, ledger=True),
+        claims_table=_claims,
+        longest=LONGEST,
+        cases=cases,
+        open_cases=[case for case in cases if case.id not in there],
+        groups=groups_table(count_answers(studies)),
+        decided=len(decided),
+        own=sum(one.own for one in decided),
+        wrong=expected_wrong(len(decided)) if decided else 0.0,
+        rule=_rule(),
+        characteristics=_characteristics(),
+    )
+    made = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC") + (f", {code}" if code else "")
+    way = '<a href="index.html">wildlab</a> › ledger'
+    footer = f"<p>{made}. Each report says which code and data it came from.</p>"
+    return page(title="wildlab ledger", body=body, kicker=way, footer=footer, style=read_style("ledger"))
+
+
+def _claims(one: StudyStatus) -> Markup:
+    rows = [
+        (
+            claim.text + (" (ours, not the thesis's)" if claim.own else ""),
+            claim.source,
+            claim.verdict,
+            tested_on(claim, flights_of(one)),
+            "",
+        )
+        for claim in one.claims
+    ]
+    return claims_table(rows) if rows else Markup()
+
+
+def _in_short(one: StudyStatus) -> str:
+    """What became of a study in a line."""
+    if not one.ran or one.state == FIRST_LOOK:
+        return one.state
+    return (
+        summed_up(one) if one.counted else f"{len(one.claims)} claims" if one.claims else "no number in print"
+    )
+
+
+def _tiles(studies: Sequence[StudyStatus]) -> list[tuple[str, str]]:
+    done = [study for study in studies if study.state == "done"]
+    states = [study.state for study in studies]
+    studied = "studies done"
+    for state, words in ((FIRST_LOOK, "at a first look"), ("failed", "failed")):
+        studied += f", {states.count(state)} {words}" if state in states else ""
+    tiles = [(f"{len(done)} / {len(studies)}", studied)]
+    # What waits for its study is in no denominator.
+    found = count_answers(studies).get(PREDICTED)
+    if found and found.judged:
+        words = f"{PREDICTED}, are close{_waiting(found.all - found.judged)}"
+        tiles.append((f"{found.close['close']} / {found.judged}", words))
+        asked = sum(found.compatible.values()) - found.compatible["too few flights"]
+        words = f"of them outside of 90 %; {found.chance:.1f} expected by chance"
+        tiles.append((f"{found.compatible['outside']} / {asked}", words))
+    theirs = [one for study in done for one in study.claims if one.verdict in SHARE_VERDICTS and not one.own]
+    waiting = sum(not one.own for study in studies for one in study.claims) - len(theirs)
+    if theirs or waiting:
+        holding, mostly = (sum(one.verdict == verdict for one in theirs) for verdict in (HOLDS, MOSTLY))
+        words = f"claims of the theses hold; {mostly} more on most flights{_waiting(waiting)}"
+        tiles.append((f"{holding} / {len(theirs)}", words))
+    if any(study.study.kind == "logged" for study in studies):
+        logged = sum(study.study.kind == "logged" for study in done)
+        tiles.append((str(logged), "done on logged flights"))
+    return tiles
+
+
+def _waiting(count: int) -> str:
+    """How many have no verdict: their study has not been run, or not in full, or says why it gives none."""
+    return f"; {count} without a verdict" if count else ""
+
+
+def _tag(one: StudyStatus) -> str:
+    study = one.study
+    if study.kind == "twin":
+        flights = f", {one.seeds} flights" if one.seeds and one.seeds > 1 else ""
+        return f"twin: {study.twin}{flights}"
+    if study.kind == "logged":
+        return f"logged: {one.flight or study.dataset or study.recipe}"
+    return TAGS["computed"]
+
+
+def _rule() -> Markup:
+    margins = "; ".join(
+        f"{kind}, a factor of {one.factor:.2f}" + (" of the odds" if one.odds else "")
+        for kind, one in KINDS.items()
+        if one.factor
+    )
+    return Markup(prose(fill(load_texts("ledger").method, {}, {"margins": margins})))  # noqa: S704 - escaped
+
+
+@lru_cache(maxsize=1)
+def _characteristics() -> Markup:
+    """How often the rule gives each answer."""
+    frame = operating_characteristics(trials=200)
+    return table_html(frame, {"factor": "our errors (times)"}, 2, "Operating characteristics")

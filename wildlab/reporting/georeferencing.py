@@ -6,6 +6,7 @@ What is said follows by rules from what `wildlab.analysis.accuracy.judge_accurac
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -14,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from wildlab.analysis import Fact
-from wildlab.analysis.accuracy import Accuracy
+from wildlab.analysis.accuracy import Accuracy, Repeats
 from wildlab.analysis.diagnose import CAUSES, Diagnosis
 from wildlab.analysis.evaluate import errors_of, on_one_heading
 from wildlab.analysis.verdict import (
@@ -33,7 +34,7 @@ from wildlab.flight.store import Flight
 from wildlab.messages.catalogue import Message, PageTexts, load_texts, words
 from wildlab.messages.quantities import measure, percent_of, significant
 from wildlab.names import listed
-from wildlab.reporting.charts.georeferencing import error_scatter, error_shares, errors_by_image
+from wildlab.reporting.charts.tracks import error_scatter, error_shares, errors_by_image
 from wildlab.reporting.figures import colour
 from wildlab.reporting.georeferencing_tables import (
     SUMMARY,
@@ -46,7 +47,6 @@ from wildlab.reporting.georeferencing_tables import (
     outliers_table,
     parameters_table,
     parts_table,
-    point_links,
     significant_parameters,
     terrain_section,
 )
@@ -413,12 +413,7 @@ def show_summary(
     verdict, reason = verdict_of_accuracy(
         found.summary, found.lost, found.ellipses, found.diagnosis, problems
     )
-    report.summary(
-        wording.messages(answer(found)),
-        level=verdict.colour,
-        verdict=(verdict.value, wording.messages([reason])[0]),
-    )
-    report.metric(VERDICT_LEVEL, "georeferencing", verdict.level, "1")
+    wording.summary(answer(found), verdict, reason, "georeferencing")
     show_advice(
         report, wording.messages(advice(found, calibrated_elsewhere=calibrated_elsewhere, problems=problems))
     )
@@ -434,7 +429,7 @@ def show_advice(report: Report, said: Sequence[str]) -> None:
 def show_contradictions(report: Report, amiss: Sequence[str], *, shown: bool) -> None:
     """What does not fit together in the flight; only how much where its locations are not open."""
     if amiss:
-        hidden = [f"{len(amiss)} findings: `wildlab check` on the flight's folder says which."]
+        hidden = [f"{len(amiss)} found: `wildlab check` says what."]
         report.alert("What does not fit together", list(amiss) if shown else hidden)
 
 
@@ -501,8 +496,7 @@ def show_accuracy(
     if diagnosis is not None:
         if corrections is not None and (diagnosis.counts or possible_share(logged, diagnosis)):
             wording.table("parameters" if diagnosis.counts else "parameters-possible", corrections)
-        if diagnosis.outliers:
-            wording.table("outliers", outliers_table(diagnosis.outliers))
+        wording.table("outliers", outliers_table(diagnosis.outliers))
     if logged.n:
         report.section(
             "Predicted uncertainty", " ".join(wording.messages([_ellipse_message(found.ellipses)]))
@@ -515,14 +509,10 @@ def show_accuracy(
     show_models(report, wording, diagnosis)
     if diagnosis is not None:
         wording.table("axes", axes_table(found.axes))
-    parts = parts_table(found)
-    if len(parts):
-        wording.table("parts", parts)
+    wording.table("parts", parts_table(found))
     if found.noise is not None:
         wording.table("noise", noise_table(found.noise, found.assumed))
-    terrain_section(report, flight, found.observations, found.points)
-    if found.points["north_m"].notna().any():
-        report.files(texts.subjects["files"], point_links(flight, found.points, source))
+    terrain_section(report, found.observations, found.points)
     report.method(texts.method)
 
 
@@ -603,10 +593,97 @@ def _figures(report: Report, wording: Wording, found: Accuracy, programs: Mappin
         series[names["corrected"]] = (diagnosis.winner.held, colour("calibrated-pose"))
     for program, table in programs.items():
         series[names["recorded"].format(program)] = (errors_of(table), colour("recorded"))
-    wording.figure("error-scatter", error_scatter(errors, "", colour("logged-pose")), main=True)
+    wording.figure("error-scatter", error_scatter(errors, colour("logged-pose")), main=True)
     report.figures(
         [
-            wording.captioned("error-shares", error_shares(series, "")),
-            wording.captioned("errors-by-image", errors_by_image(found.scored, "")),
+            wording.captioned("error-shares", error_shares(series)),
+            wording.captioned("errors-by-image", errors_by_image(found.scored)),
         ]
     )
+
+
+#: Ellipses whose size is off by less than this factor fit the spread.
+FITTING = 1.25
+#: Rows of the table of things.
+MOST_THINGS = 20
+
+
+def answer_repeats(found: Repeats) -> Message:
+    """How far apart sightings lie, and whether the ellipses fit that."""
+    spread, total = found.spread, len(found.points)
+    values = {"lost": str(found.lost), "total": str(total)}
+    if found.lost > MANY_LOST * total:
+        return Message("many-lost", values)
+    if spread is None:
+        return Message("none-twice", values)
+    values |= {
+        "scatter": short_length(spread.sd),
+        "sightings": str(spread.sightings),
+        "things": str(spread.things),
+        "ratio": significant(spread.consistent),
+    }
+    if math.isnan(spread.consistent) or spread.sightings < FEW_POINTS:
+        return Message("scatter", values)
+    if spread.consistent > FITTING:
+        return Message("ellipses-small", values)
+    return Message("ellipses-large" if spread.consistent < 1 / FITTING else "ellipses-fit", values)
+
+
+def verdict_of_repeats(found: Repeats, problems: int = 0) -> tuple[Verdict, Message]:
+    """What it comes to, and why: never sound, for the errors themselves are not known."""
+    total = len(found.points)
+    word = verdict_of(Evidence(problems=problems, lost=found.lost / total if total else math.nan))
+    if problems:
+        return word, Message("reason-contradictions", {"problems": str(problems)})
+    if word == Verdict.MEND:
+        return word, Message("reason-lost", {"lost": str(found.lost), "total": str(total)})
+    return word, Message("reason-unknown")
+
+
+def show_repeats(report: Report, flight: Flight, found: Repeats, amiss: Sequence[str]) -> None:
+    """Write the page, but for its terrain, and record its numbers.
+
+    Parameters
+    ----------
+    report
+        Is added to.
+    flight, found
+        The flight, and its sightings.
+    amiss
+        What does not fit together in the flight: `wildlab.flight.checks.check.sense_sentences`.
+    """
+    texts = load_texts("repeat-sightings")
+    wording = Wording(report, texts)
+    spread, diagnosis, total = found.spread, found.diagnosis, len(found.points)
+    images = found.points["frame_id"].nunique()
+    report.head(texts.subjects["question"], f"{images} images, {total} points, no truth")
+    word, reason = verdict_of_repeats(found, sum(one.startswith("problem") for one in amiss))
+    said = wording.messages([answer_repeats(found)])
+    cause = Wording(report, load_texts("georeferencing"))
+    if diagnosis is not None and spread is not None:
+        said += cause.messages([cause_message(diagnosis)])
+    report.summary(said, level=word.colour, verdict=(word.value, wording.messages([reason])[0]))
+    report.metric(VERDICT_LEVEL, "georeferencing", word.level, "1")
+    show_contradictions(report, amiss, shown=flight.manifest.locations.sensitivity == "open")
+    if spread is not None:
+        report.metric("sighting_spread", "logged-pose", spread.sd, "m", n=spread.sightings)
+        report.metric("sighting_consistency", "logged-pose", spread.consistent, "1", n=spread.sightings)
+        report.tiles(
+            [
+                (short_length(spread.sd), texts.subjects["tile-scatter"]),
+                (f"{spread.things} of {len(found.things)}", texts.subjects["tile-things"]),
+                (f"{found.lost} of {total}", texts.subjects["tile-lost"]),
+            ]
+        )
+        wording.table("things", found.things.head(MOST_THINGS))
+    if diagnosis is not None:
+        gain = diagnosis.winner.gain.gain
+        n = len(diagnosis.scored)
+        report.metric("sighting_gain", "winner", gain.estimate, "m", n=n, low=gain.low, high=gain.high)
+        report.metric("cause_certain", "winner", float(diagnosis.counts), "1", n=n)
+        if diagnosis.winner.causes:
+            cause.table("parameters", parameters_table(report, diagnosis.calibration))
+    report.limits([wording.say(one) for one in texts.limits])
+    report.section("Details")
+    show_models(report, cause, diagnosis)
+    report.method(texts.method)

@@ -9,39 +9,24 @@ import pandas as pd
 
 from wildlab.analysis.accuracy import Accuracy
 from wildlab.analysis.diagnose import Diagnosis
-from wildlab.analysis.evaluate import blocks_of, errors_of, score_points
-from wildlab.analysis.georeference import (
-    Observations,
-    georeference,
-    on_level,
-    points_geojson,
-    shift_from_level,
-    with_axes,
-)
+from wildlab.analysis.evaluate import errors_of
+from wildlab.analysis.georeference import Observations, shift_from_level
 from wildlab.evaluation.correlated_errors import WanderNoise
-from wildlab.evaluation.errors import AlongAxis, ErrorSummary, bootstrap_interval, summarise
+from wildlab.evaluation.errors import AlongAxis, ErrorSummary, summarise
 from wildlab.evaluation.outliers import Outlier
-from wildlab.files import csv_text
-from wildlab.flight.store import Flight
 from wildlab.geometry.calibration import BORESIGHT, Calibration
 from wildlab.messages.catalogue import Message, load_texts
 from wildlab.messages.quantities import measure
 from wildlab.reporting.report import Report, Wording
-from wildlab.reporting.text import data_link
-
-#: Fewer images than this give no interval.
-FEWEST_IMAGES = 6
 
 
-def terrain_section(report: Report, flight: Flight, observations: Observations, points: pd.DataFrame) -> None:
+def terrain_section(report: Report, observations: Observations, points: pd.DataFrame) -> None:
     """The section on the terrain, and its metrics; nothing where the flight has none.
 
     Parameters
     ----------
     report
         Is added to.
-    flight
-        The flight.
     observations, points
         What was georeferenced, and where it lies.
     """
@@ -52,63 +37,9 @@ def terrain_section(report: Report, flight: Flight, observations: Observations, 
     shift = shift_from_level(observations, points)
     if shift.n:
         report.metric("shift_from_level_ground", "terrain", shift.median, "m", n=shift.n)
-    message = Message(
-        "terrain-shift", {"shift": measure(shift.median, "m"), "most": measure(shift.largest, "m")}
-    )
-    both = _errors_on_both(flight, observations, points) if placed.any() else None
-    if both is not None:
-        medians = np.median(both[["error_m", "error_m_level"]].to_numpy(float), axis=0)
-        report.metric("horizontal_error_median", "level-ground", float(medians[1]), "m", n=len(both))
-        message = terrain_message(float(medians[0]), float(medians[1]), _gain_interval(flight, both))
+    values = {"shift": measure(shift.median, "m"), "most": measure(shift.largest, "m")}
     wording = Wording(report, load_texts("georeferencing"))
-    report.section("Terrain", " ".join(wording.messages([message])))
-
-
-def _errors_on_both(flight: Flight, observations: Observations, points: pd.DataFrame) -> pd.DataFrame | None:
-    """Points with an error over terrain (``error_m``) and on level ground (``error_m_level``)."""
-    if flight.truth is None or not len(flight.truth):
-        return None
-    flat = georeference(on_level(observations), np.random.default_rng(0))
-    both = score_points(flight, points).merge(
-        score_points(flight, flat), on="detection_id", suffixes=("", "_level")
-    )
-    both = both[np.isfinite(both["error_m"]) & np.isfinite(both["error_m_level"])]
-    return None if both.empty else both
-
-
-def _gain_interval(flight: Flight, both: pd.DataFrame) -> tuple[float, float]:
-    """Of how much less the median error over terrain is, 95 %; NaN for too few images."""
-    if both["frame_id"].nunique() < FEWEST_IMAGES:
-        return np.nan, np.nan
-    # Two distances in place of north and east: what is drawn again and again is the same.
-    distances = both[["error_m", "error_m_level"]].to_numpy(float)
-    rng = np.random.default_rng(0)
-    return bootstrap_interval(_gain, distances, blocks_of(flight, both), rng, level=0.95)
-
-
-def _gain(distances: np.ndarray) -> float:
-    """How much less the median of the first column is than that of the second."""
-    return float(np.median(distances[:, 1]) - np.median(distances[:, 0]))
-
-
-def terrain_message(terrain: float, level: float, interval: tuple[float, float]) -> Message:
-    """Which is nearer to the truth, by the interval of the difference of median errors.
-
-    Parameters
-    ----------
-    terrain, level
-        Median errors, metres.
-    interval
-        Of how much less the first is than the second, 95 %; NaN where there is none.
-
-    Examples
-    --------
-    >>> terrain_message(2.0, 5.0, (1.0, 4.0)).key, terrain_message(2.0, 5.0, (-1.0, 4.0)).key
-    ('terrain-nearer', 'terrain-undecided')
-    """
-    low, high = interval
-    key = "terrain-nearer" if low > 0 else "level-nearer" if high < 0 else "terrain-undecided"
-    return Message(key, {"terrain": measure(terrain, "m"), "level": measure(level, "m")})
+    report.section("Terrain", " ".join(wording.messages([Message("terrain-shift", values)])))
 
 
 #: Rows of the table of models.
@@ -129,8 +60,6 @@ _NOISE = {
     "heading": ("heading_deg", "deg"),
     "pixel": ("pixel_px", "px"),
 }
-#: What the files of points have of a point, m and degrees; times count from the first image.
-POINT_COLUMNS = ("point", "seconds", "north_m", "east_m", "long_90_m", "short_90_m", "bearing_deg")
 #: Fields of an error summary by the names of their metrics.
 SUMMARY = {
     "horizontal_error_mean": "mean",
@@ -276,36 +205,6 @@ def noise_table(noise: WanderNoise, assumed: Mapping[str, float]) -> pd.DataFram
             for kind, (key, unit) in _NOISE.items()
         ]
     )
-
-
-def points_table(points: pd.DataFrame) -> pd.DataFrame:
-    """Places in local metres with their ellipses, without names, dates or anything else that locates them.
-
-    Parameters
-    ----------
-    points
-        From `wildlab.analysis.georeference.georeference`.
-
-    Returns
-    -------
-    DataFrame
-        With `POINT_COLUMNS`; ``seconds`` is the time since the first point, NaN where that is not known.
-    """
-    times = points["time_s"].to_numpy(float)
-    first = np.nanmin(times) if np.isfinite(times).any() else np.nan
-    table = with_axes(points).assign(point=np.arange(1, len(points) + 1), seconds=times - first)
-    return table[list(POINT_COLUMNS)].round(3)
-
-
-def point_links(flight: Flight, points: pd.DataFrame, source: str | None) -> list[str]:
-    """Links that hand over all points: metres for all, places where locations are open."""
-    links = [
-        data_link(csv_text(points_table(points)).encode(), "text/csv", "points.csv", "CSV, local metres")
-    ]
-    if flight.manifest.locations.sensitivity == "open":
-        places = points_geojson(flight, points, source or "").encode()
-        links.append(data_link(places, "application/geo+json", "points.geojson", "GeoJSON, exact places"))
-    return [link for link in links if link]
 
 
 def significant_parameters(calibration: Calibration) -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import re
 import tomllib
 from collections import Counter
@@ -13,7 +14,7 @@ from bs4 import BeautifulSoup, Tag
 from bs4.element import NavigableString, PageElement
 
 from wildlab.paths import DATA
-from wildlab.reporting.text import escape, slug
+from wildlab.reporting.text import render, slug
 
 #: What a heading or a block may say it is, in the order of the page; "" is a section like any other.
 ORDER = HEAD, SUMMARY, ALERT, MAIN, TILES, OPENING, ADVICE, LIMITS, SECTION, METHOD = (
@@ -35,28 +36,11 @@ _LEVELS = {"good", "warn", "bad", "neutral"}
 _BY_CLASS = {"summary": SUMMARY, "look": ALERT, "tiles": TILES}
 
 
-def order_report(body: str) -> str:
-    """The parts of a report in the order of a page.
-
-    Parameters
-    ----------
-    body
-        HTML as a notebook showed it, one part after the other.
-
-    Returns
-    -------
-    str
-        HTML. Where there is no ``<header>``, nothing is moved: it is no report.
-    """
-    soup = BeautifulSoup(body, "html.parser")
-    if soup.header is None:
-        return body
-    arrange_parts(soup)
-    return re.sub(r"\n\s*\n+", "\n", str(soup)).strip()
-
-
 def arrange_parts(soup: BeautifulSoup) -> None:
-    """Put the parts of a report in the order of a page; see `order_report`."""
+    """Put the parts of a report, as a notebook showed them one after the other, in the order of a page.
+
+    Where there is no ``<header>``, nothing is moved: it is no report.
+    """
     if soup.header is None:
         return
     groups: dict[str, list[PageElement]] = {part: [] for part in (*ORDER, VERDICT)}
@@ -175,27 +159,16 @@ def load_glossary() -> tuple[Word, ...]:
     return tuple(Word(**row) for row in tomllib.loads(FILE.read_text(encoding="utf-8"))["word"])
 
 
-def with_glossary(body: str, known: Sequence[Word] | None = None) -> str:
-    """A page's body with its words explained: a list before the method, and a link at each first use.
+def explain_words(soup: BeautifulSoup, known: Sequence[Word] | None = None) -> None:
+    """Explain the words of a page's body that it uses most: a list before the method, a link at a first use.
 
     Parameters
     ----------
-    body
-        HTML.
+    soup
+        Is changed, where it uses any.
     known
         The words to look for; those of `load_glossary` by default.
-
-    Returns
-    -------
-    str
-        HTML; as it was, where it uses none of them.
     """
-    soup = BeautifulSoup(body, "html.parser")
-    return str(soup) if explain_words(soup, known) else body
-
-
-def explain_words(soup: BeautifulSoup, known: Sequence[Word] | None = None) -> bool:
-    """Explain the words of a page's body, see `with_glossary`; whether it uses any."""
     known = load_glossary() if known is None else known
     # The longest spelling first; one of small letters also begins a sentence.
     written = {spelling: word for word in known for spelling in word.match}
@@ -204,48 +177,32 @@ def explain_words(soup: BeautifulSoup, known: Sequence[Word] | None = None) -> b
     longest = sorted(map(re.escape, by_spelling), key=len, reverse=True)
     pattern = re.compile(rf"(?<![\w-])(?:{'|'.join(longest)})(?![\w-])")
     found = [
-        (node, matches)
-        for node in soup.find_all(string=True)
-        if type(node) is NavigableString
-        and (matches := list(pattern.finditer(node)))
-        and not any(_NOT_IN.fullmatch(one.name) for one in node.parents)
+        node
+        for node in soup.find_all(string=pattern)
+        if type(node) is NavigableString and not any(_NOT_IN.fullmatch(one.name) for one in node.parents)
     ]
-    top = soup.find("h2")
-    before = set() if top is None else {id(text) for text in top.find_all_previous(string=True)}
-    uses = Counter(by_spelling[match[0]].name for _, matches in found for match in matches)
-    first = {by_spelling[match[0]].name for node, matches in found if id(node) in before for match in matches}
+    uses = Counter(by_spelling[match].name for node in found for match in pattern.findall(node))
     order = {word.name: i for i, word in enumerate(known)}
-    # Those of the first screens come before all others: not everybody reads on.
-    kept = sorted(uses, key=lambda name: (name not in first, -uses[name], order[name]))[:MOST]
-    if not kept:
-        return False
-    waiting = set(kept)
+    waiting = sorted(uses, key=lambda name: (-uses[name], order[name]))[:MOST]
+    words = sorted((word for word in known if word.name in waiting), key=lambda word: word.name.lower())
+
+    def link(match: re.Match[str]) -> str:
+        word = by_spelling[match[0]]
+        if word.name not in waiting:
+            return match[0]
+        waiting.remove(word.name)
+        return f'<a class="word" href="#{word.anchor}">{match[0]}</a>'
+
     # What is folded away is linked only where there is no other use.
-    for node, matches in sorted(found, key=lambda one: one[0].find_parent("details") is not None):
-        pieces: list[PageElement] = []
-        at = 0
-        for match in matches:
-            word = by_spelling[match[0]]
-            if word.name in waiting:
-                waiting.discard(word.name)
-                link = soup.new_tag("a", attrs={"class": "word", "href": f"#{word.anchor}"}, string=match[0])
-                pieces += [NavigableString(node[at : match.start()]), link]
-                at = match.end()
-        if pieces:
-            node.replace_with(*pieces, NavigableString(node[at:]))
-    items = "".join(
-        f'<dt id="{word.anchor}">{escape(word.name)}</dt><dd>{escape(word.text)}</dd>'
-        for word in sorted((word for word in known if word.name in kept), key=lambda word: word.name.lower())
-    )
-    listed = BeautifulSoup(
-        '<details class="plain" id="glossary"><summary>Words used here</summary>'
-        f'<dl class="words">{items}</dl></details>',
-        "html.parser",
-    )
+    for node in sorted(found, key=lambda one: one.find_parent("details") is not None):
+        node.replace_with(
+            *BeautifulSoup(pattern.sub(link, html.escape(node, quote=False)), "html.parser").contents
+        )
+    if not words:
+        return
+    listed = BeautifulSoup(render("glossary", words=words), "html.parser")
     method = soup.find("details", class_="method")
-    for part in list(listed.contents):
-        if isinstance(method, Tag):
-            method.insert_before(part)
-        else:
-            soup.append(part)
-    return True
+    if isinstance(method, Tag):
+        method.insert_before(listed)
+    else:
+        soup.append(listed)

@@ -18,7 +18,7 @@ from wildlab.evaluation.identities import Gospa, Identities
 from wildlab.messages.catalogue import Message, load_texts
 from wildlab.messages.quantities import length, percent_of
 from wildlab.names import listed
-from wildlab.reporting.charts import many as charts
+from wildlab.reporting.charts import following as charts
 from wildlab.reporting.report import Report, Wording
 from wildlab.reporting.tracking import count_assumed, parameters_table, plain
 from wildlab.tracking.many.tracks import Count, count_interval, count_probabilities
@@ -318,7 +318,7 @@ def show_many(report: Report, followed: ManyTracks, lives: Identities | None) ->
     report.summary(wording.messages(answer(followed, lives)), level=level, verdict=verdict)
     if followed.notes:
         report.points(followed.notes)
-    figure, name, alt, caption = charts.map_shown(followed)
+    figure, name, alt, caption = charts.tracks_shown(followed)
     report.figure(figure, name=name, alt=alt, caption=caption, main=True)
     if lives is not None and any(life.visible for life in lives.targets.values()):
         report.section(names["over-time"])

@@ -32,7 +32,6 @@ from typing import Any
 
 from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import FITTED, NO_PREMISE, SHARE_VERDICTS, UNDECIDABLE
-from wildlab.files import write_json
 
 KINDS = ("logged", "twin", "computed")
 VERDICTS = (*SHARE_VERDICTS, NO_PREMISE, UNDECIDABLE, FITTED)
@@ -55,17 +54,15 @@ def plain_number(value: Any, what: str) -> float | int | None:
     if value is None:
         return None
     if isinstance(value, (bool, str)):
-        raise WildlabError(f"{what} is {value!r}", "give a number, or None where there is none")
+        raise WildlabError(f"{what} is {value!r}", "give a number or None")
     try:
         number = float(value)
     except (TypeError, ValueError) as error:
-        raise WildlabError(
-            f"{what} is of type {type(value).__name__}", "give a number, or None where there is none"
-        ) from error
+        raise WildlabError(f"{what} is of type {type(value).__name__}", "give a number or None") from error
     if math.isnan(number):
         return None
     if math.isinf(number):
-        raise WildlabError(f"{what} is infinite", "look for a division by zero, or give None")
+        raise WildlabError(f"{what} is infinite", "give a number or None")
     return int(number) if isinstance(value, int) else number
 
 
@@ -222,11 +219,6 @@ def document(
         "metrics": metrics,
         "claims": claims,
     }
-
-
-def write_metrics(path: Path, content: dict[str, Any]) -> None:
-    """Write a `document` atomically."""
-    write_json(path, content)
 
 
 def read_metrics(path: Path) -> dict[str, Any]:

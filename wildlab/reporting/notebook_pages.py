@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from html import unescape
 from html.parser import HTMLParser
@@ -23,10 +23,10 @@ from nbformat import NotebookNode
 
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic
+from wildlab.messages.catalogue import load_texts
 from wildlab.paths import PACKAGE, ROOT
 from wildlab.reporting.layout import VERDICT, arrange_parts, explain_words
-from wildlab.reporting.page import page
-from wildlab.reporting.text import escape, maths, read_style
+from wildlab.reporting.text import HANDED_OVER, escape, maths, page, read_style
 
 
 def read_notebook(path: Path) -> nbformat.NotebookNode:
@@ -155,16 +155,7 @@ FORBIDDEN = re.compile(
     "script|i?frame|object|embed|applet|link|base|meta|form|input|button|select|textarea|audio|video|source|"
     "track|portal|template|noscript"
 )
-#: The theses, as reports cite them: "H 5.6.1", "H (7.35)", "F table 3.1" (in full: ``docs/references.md``).
-THESES = {
-    "H": "H. H. Helgesen, Detection and Tracking of Floating Objects using UAVs with Optical Sensors, "
-    "doctoral thesis, Norwegian University of Science and Technology, 2019",
-    "F": "A. Flodell and C. Christensson, Wildlife Surveillance Using a UAV and Thermal Imagery, "
-    "master's thesis, Linköping University, 2016",
-}
 _CITED = re.compile(r"\b([HF])\s(?:\(?\d|(?:section|chapter|example|equation|table|figure)s?\s\(?\d)")
-#: How the address begins of a file within a link: a table or points, which no browser runs.
-HANDED_OVER = ("data:text/csv;base64,", "data:application/geo+json;base64,")
 _FETCHING = ("src", "srcset", "poster", "background", "data", "xlink:href", "action", "formaction", "ping")
 #: A link to a file in the same folder or below it: no scheme, no host.
 _BESIDE = re.compile(r"[\w.%~-]+(/[\w.%~-]+)*(#[\w.%~-]*)?")
@@ -179,13 +170,11 @@ def notebook_body(notebook: NotebookNode) -> str:
             continue
         if cell.cell_type == "markdown":
             parts.append(markdown_html(cell.source))
-        for output in cell.get("outputs", ()):
-            data = output.get("data", {})
-            if "text/html" in data:
-                parts.append(data["text/html"])
-            elif "image/png" in data:
-                alt = escape(output.metadata.get("image/png", {}).get("alt", ""))
-                parts.append(f'<img alt="{alt}" src="data:image/png;base64,{data["image/png"].strip()}">')
+        parts += [
+            _shown_output(output)
+            for output in cell.get("outputs", ())
+            if {"text/html", "image/png"} & set(output.get("data", {}))
+        ]
     return re.sub(r"\n\s*\n+", "\n", "\n".join(parts)).strip()
 
 
@@ -305,7 +294,11 @@ def cited_theses(text: str) -> str:
     ''
     """
     found = set(_CITED.findall(text))
-    named = [f"{letter}: {escape(about)}" for letter, about in THESES.items() if letter in found]
+    named = [
+        f"{letter}: {escape(about)}"
+        for letter, about in load_texts("published").subjects.items()
+        if letter in found
+    ]
     return f"<p>{'. '.join(named)}.</p>" if named else ""
 
 
@@ -330,7 +323,7 @@ def examine(whole: str, name: str, *, alone: bool = True) -> None:
     if size > MAX_BYTES:
         raise WildlabError(
             f"the report has {size / 1e6:.1f} MB, more than {MAX_BYTES / 1e6:.0f} MB",
-            "show fewer points, or fewer and smaller figures",
+            "show fewer points or figures",
             file=file,
         )
     examiner = _Examiner(file, alone)
@@ -355,16 +348,14 @@ class _Examiner(HTMLParser):
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         if FORBIDDEN.fullmatch(tag) and not (tag == "meta" and self.in_head):
-            self.refuse(f"the report has a <{tag}>", "show text, tables and pictures only, through Report")
+            self.refuse(f"the report has a <{tag}>", "leave it out")
         given = dict(attrs)
         for name, value in attrs:
             self.examine_attribute(tag, name, value or "")
             if name == "href":
                 self.examine_link(value or "", "download" in given)
         if tag == "img" and not (given.get("alt") or "").strip():
-            self.refuse(
-                "a picture has no alt text", "show it with Report.figure(alt=...), saying what it shows"
-            )
+            self.refuse("a picture has no alt text", "say what it shows")
         if re.fullmatch("h[1-6]", tag):
             self.levels.append(int(tag[1]))
         self.ids.add(given.get("id") or "")
@@ -398,7 +389,7 @@ class _Examiner(HTMLParser):
             self.refuse(f"a link runs {to[:60]!r}", "link to a page")
         elif scheme.startswith("data:"):
             if not download or not to.startswith(HANDED_OVER):
-                self.refuse(f"a link runs {to[:60]!r}", "hand over tables only, by wildlab.reporting.text")
+                self.refuse(f"a link runs {to[:60]!r}", "hand over tables only")
         elif to.startswith("#"):
             self.within.append(to)
         elif not to.startswith("https://") and (self.alone or not _BESIDE.fullmatch(to)):
@@ -420,8 +411,6 @@ class _Examiner(HTMLParser):
                 self.refuse(problem, "use the level between")
 
 
-#: The classes of nbconvert's own wrappers.
-_WRAPPERS = re.compile("^(cell|inner_cell|output(_wrapper|_area|_subarea)?|text_cell_render|prompt|input)$")
 # Code at a line in blue, what it printed on grey. The colours hold 4.5:1 on white.
 TUTORIAL_STYLE = read_style("tutorial")
 
@@ -452,9 +441,7 @@ def tutorial_page(notebook: nbformat.NotebookNode, *, name: str, footer: str = "
     for number, cell in enumerate(notebook.cells, start=1):
         if any(output.output_type == "error" for output in cell.get("outputs", [])):
             raise WildlabError(f"cell {number} ended in an error", "mend it", file=f"{name}.ipynb")
-    soup = BeautifulSoup(_body(_joined(notebook)), "html.parser")
-    for block in soup.find_all("div", class_=_WRAPPERS):
-        block.unwrap()
+    soup = BeautifulSoup("\n".join(_tutorial_parts(notebook)), "html.parser")
     for style in soup.find_all("style"):
         style.decompose()  # pandas has its own for each table
     for i, image in enumerate(soup.find_all("img"), start=1):
@@ -475,47 +462,39 @@ def tutorial_page(notebook: nbformat.NotebookNode, *, name: str, footer: str = "
     return whole
 
 
-def _body(notebook: nbformat.NotebookNode) -> str:
-    """Code and what it left, as HTML of nbconvert's template ``basic``."""
-    from nbconvert import HTMLExporter
-    from traitlets.config import Config
+def _tutorial_parts(notebook: nbformat.NotebookNode) -> Iterator[str]:
+    """Words, code and what it left, as HTML; warnings are left out."""
+    from nbconvert.filters.highlight import Highlight2HTML
 
-    off = ("exclude_input_prompt", "exclude_output_prompt", "exclude_output_stdin", "exclude_anchor_links")
-    exporter = HTMLExporter(
-        config=Config(
-            {
-                "TagRemovePreprocessor": {"enabled": True, "remove_cell_tags": sorted(REMOVED_TAGS)},
-                "HTMLExporter": {
-                    "template_name": "basic",
-                    **dict.fromkeys(off, True),
-                    "embed_images": True,
-                    **dict.fromkeys(("require_js_url", "mathjax_url", "jquery_url", "mermaid_js_url"), ""),
-                    "widget_renderer_url": "",
-                    "preprocessors": ["nbconvert.preprocessors.TagRemovePreprocessor"],
-                },
-            }
-        )
-    )
-    exporter.register_filter("markdown2html", lambda source, *_, **__: markdown_html(source))
-    return str(exporter.from_notebook_node(notebook)[0])
-
-
-def _joined(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
-    """A copy without warnings, in which what a cell printed in one go is one output: a kernel sends it in
-    pieces."""
-    copy: nbformat.NotebookNode = nbformat.from_dict(notebook)
-    for cell in copy.cells:
-        joined: list[nbformat.NotebookNode] = []
+    colour = Highlight2HTML()
+    for cell in notebook.cells:
+        if REMOVED_TAGS.intersection(cell.metadata.get("tags", ())):
+            continue
+        yield markdown_html(cell.source) if cell.cell_type == "markdown" else colour(cell.source)
+        printed = ""
         for output in cell.get("outputs", []):
-            if output.get("name") == "stderr":
-                continue
-            if joined and output.get("name", "") == joined[-1].get("name") and "text" in output:
-                joined[-1].text += output.text
-            else:
-                joined.append(nbformat.from_dict(output))
-        if cell.cell_type == "code":
-            cell.outputs = joined
-    return copy
+            # A kernel sends in pieces what a cell printed in one go.
+            if output.get("name") == "stdout":
+                printed += output.text
+            elif output.output_type != "stream":
+                yield _printed(printed) + _shown_output(output)
+                printed = ""
+        yield _printed(printed)
+
+
+def _printed(text: str) -> str:
+    return f"<pre>{escape(text)}</pre>" if text else ""
+
+
+def _shown_output(output: nbformat.NotebookNode) -> str:
+    """What a cell has shown, in its richest form."""
+    data = output.get("data", {})
+    if "text/html" in data or "image/png" not in data:
+        return str(data.get("text/html") or _printed(data.get("text/plain", "")))
+    about = output.metadata.get("image/png", {})
+    size = "".join(f' {name}="{about[name]}"' for name in ("width", "height") if name in about)
+    source = f"data:image/png;base64,{data['image/png'].strip()}"
+    return f'<img alt="{escape(about.get("alt", ""))}"{size} src="{source}">'
 
 
 def _frame(soup: BeautifulSoup, image: Tag, ordinal: int) -> None:

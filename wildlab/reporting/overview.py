@@ -43,7 +43,7 @@ from wildlab.evaluation.streams import FINE, FLOOR_HZ, HARMFUL
 from wildlab.flight.clocks import MAX_GAP_S, USUAL_STEPS, gnss_times
 from wildlab.messages import quantities
 from wildlab.messages.catalogue import Message, load_texts
-from wildlab.messages.quantities import metres, number, percent_of
+from wildlab.messages.quantities import FORMS, metres, number, percent_of
 from wildlab.names import listed
 from wildlab.reporting.charts import overview as charts
 from wildlab.reporting.georeferencing import show_advice, show_contradictions, words_of_causes
@@ -134,7 +134,7 @@ def gain_message(gain: Gain) -> Message:
 def alarm_message(alarm: Alarm, overview: Overview) -> Message:
     """One alarm: how much, and when since the first stamp."""
     begin = min((pace.begin for pace in overview.streams.values() if pace.n), default=0.0)
-    size = quantities.fine_length(alarm.size) if _UNITS[alarm.what] == "m" else f"{alarm.size:.1f}"
+    size = quantities.length(alarm.size) if _UNITS[alarm.what] == "m" else f"{alarm.size:.1f}"
     values = {
         "size": size,
         "at": f"{alarm.worst - begin:.0f}",
@@ -251,35 +251,32 @@ def record(report: Report, overview: Overview, gains: Sequence[Gain], counts: Ma
         above = overview.above[0]
         low, high = np.nanquantile(above, [0.05, 0.95])
         report.metric("height_above_ground", FLIGHT, float(np.nanmedian(above)), "m", low=low, high=high)
-    for name, pace in overview.streams.items():
-        if not pace.n or not overview.series:
-            continue
-        if pace.even and np.isfinite(pace.rate_hz):
+    for name, pace in overview.streams.items() if overview.series else ():
+        if pace.n and pace.even and np.isfinite(pace.rate_hz):
             report.metric("rate", name, pace.rate_hz, "Hz", n=pace.n)
-        report.metric("paused", name, pace.paused_s, "s", n=len(pace.gaps))
-    frames = overview.flight.frames
-    if frames is not None and len(frames) and overview.source:
-        without = next((one.lost for one in overview.lost if one.key == "images_without_pose"), 0)
-        note("images_with_pose", 1 - without / len(frames), "1", len(frames))
+        if pace.n:
+            report.metric("paused", name, pace.paused_s, "s", n=len(pace.gaps))
+    frames = 0 if overview.flight.frames is None else len(overview.flight.frames)
+    if frames and overview.source:
+        note("images_with_pose", 1 - _without_pose(overview) / frames, "1", frames)
     if overview.coverage is not None and overview.coverage.placed.any():
         note("area_seen", overview.coverage.area_m2, "m^2", int(overview.coverage.placed.sum()))
         note("images_per_place", overview.coverage.looks, "1")
     seen, images, placed = overview.detections
-    if seen:
-        note("detections", seen, "1", seen)
-        in_images = overview.detections_in_images
-        note("detections_in_images", in_images, "1", seen)
-        if in_images:
-            note("detections_placed", placed, "1", seen)
-        if frames is not None and len(frames):
-            note("images_with_detections", images, "1", len(frames))
-        things = things_named(overview)
-        if things:
-            note("things_named", things, "1", seen)
+    in_images = overview.detections_in_images
+    for name, count, n, told in (
+        ("detections", seen, seen, seen),
+        ("detections_in_images", in_images, seen, seen),
+        ("detections_placed", placed, in_images, seen and in_images),
+        ("images_with_detections", images, frames, seen and frames),
+        ("things_named", things_named(overview), seen, seen and things_named(overview)),
+    ):
+        if told:
+            note(name, count, "1", n)
     if overview.vibration is not None:
-        found = overview.vibration[0]
-        note("shaking_median", float(np.median(found.worst)), "m/s^2", len(found.worst))
-        note("shaking_max", float(found.worst.max()), "m/s^2", len(found.worst))
+        worst = overview.vibration[0].max(axis=1)
+        note("shaking_median", float(np.median(worst)), "m/s^2", len(worst))
+        note("shaking_max", float(worst.max()), "m/s^2", len(worst))
     for trouble in overview.troubles:
         report.metric("trouble", trouble.what.replace(" ", "-"), trouble.seconds, "s", n=len(trouble.spells))
     for alarm in overview.alarms:
@@ -288,6 +285,11 @@ def record(report: Report, overview: Overview, gains: Sequence[Gain], counts: Ma
         report.metric("gain_share", gain.key, gain.share, "1")
     for lost in overview.lost:
         report.metric("lost", lost.key, lost.lost, "1", n=lost.of)
+
+
+def _without_pose(overview: Overview) -> int:
+    """How many images have no pose."""
+    return next((one.lost for one in overview.lost if one.key == "images_without_pose"), 0)
 
 
 def things_named(overview: Overview) -> int:
@@ -366,23 +368,22 @@ def coverage_table(overview: Overview) -> pd.DataFrame:
 def clocks_table(overview: Overview, numbers: Numbers) -> pd.DataFrame:
     """Offsets of the clocks: the given ones, and what is left of the camera's; no rows where none applies."""
     manifest, tables = overview.flight.manifest, overview.flight.tables
-    if manifest.time.kind != "utc":
-        return pd.DataFrame(columns=["clock", "offset", "left", "low", "high"])
+    left = numbers.get(("clock_offset", "calibration"))
     given = [
-        ("camera", manifest.clocks.camera_offset_s, "frames" in tables),
-        ("truth", manifest.clocks.truth_offset_s, "truth" in tables),
-        ("satellite receiver", manifest.clocks.gnss_offset_s - manifest.gnss.latency_s, "gnss" in tables),
+        ("camera", "frames", manifest.clocks.camera_offset_s),
+        ("truth", "truth", manifest.clocks.truth_offset_s),
+        ("satellite receiver", "gnss", manifest.clocks.gnss_offset_s - manifest.gnss.latency_s),
     ]
-    entry = numbers.get(("clock_offset", "calibration"), {})
-    rows = []
-    for name, offset, there in given:
-        left = {
-            key: np.nan if name != "camera" or entry.get(end) is None else entry[end]
-            for key, end in (("left", "value"), ("low", "low"), ("high", "high"))
+    rows = [
+        {
+            "clock": name,
+            "offset": offset,
+            "left": FORMS["range"](left) if left and name == "camera" else "not estimated",
         }
-        if there:
-            rows.append({"clock": name, "offset": offset, **left})
-    return pd.DataFrame(rows, columns=["clock", "offset", "left", "low", "high"])
+        for name, table, offset in given
+        if table in tables and manifest.time.kind == "utc"
+    ]
+    return pd.DataFrame(rows)
 
 
 # -- the page
@@ -417,8 +418,7 @@ def tiles(overview: Overview) -> list[tuple[str, str]]:
         found.append((quantities.way_length(way), names["tile-way"]))
     frames = overview.flight.frames
     if frames is not None and len(frames):
-        without = next((one.lost for one in overview.lost if one.key == "images_without_pose"), 0)
-        posed = len(frames) - without if overview.source else 0
+        posed = len(frames) - _without_pose(overview) if overview.source else 0
         found.append((f"{posed} / {len(frames)}", names["tile-posed"]))
     if overview.coverage is not None and overview.coverage.placed.any():
         found.append((quantities.area(overview.coverage.area_m2), names["tile-area"]))
@@ -429,7 +429,7 @@ def tiles(overview: Overview) -> list[tuple[str, str]]:
         on_ground = (f"{placed} / {pixels}", names["tile-placed"])
         found.append(on_ground if pixels else (str(seen), names["tile-detections"]))
     elif overview.vibration is not None:
-        found.append((f"{number(overview.vibration[0].worst.max())} m/s²", names["tile-shaking"]))
+        found.append((f"{number(overview.vibration[0].max())} m/s²", names["tile-shaking"]))
     return found or [("0", names["tile-nothing"])]
 
 
@@ -464,8 +464,7 @@ def show_overview(
     )
     shown = overview.flight.manifest.locations.sensitivity == "open"
     report.head(wording.texts.subjects["question"], subtitle(overview))
-    said, why = wording.messages(answer(found)), wording.messages([reason(found, counts)])[0]
-    report.summary(said, level=word.colour, verdict=(word.value, why))
+    wording.summary(answer(found), word, reason(found, counts))
     report.tiles(tiles(overview))
     show_advice(report, wording.messages(_with_remedies(gains[:MOST])))
     if overview.problems:
@@ -483,8 +482,7 @@ def show_overview(
         "clocks": clocks_table(overview, numbers),
     }
     for key, frame in frames.items():
-        if len(frame):
-            wording.table(key, frame)
+        wording.table(key, frame)
     report.method(wording.say(wording.texts.method, METHOD_VALUES))
 
 
@@ -500,10 +498,10 @@ def _show_figures(wording: Wording, overview: Overview) -> None:
     clock = charts.Clock(begin, overview.length_s)
     report, path, coverage = wording.report, overview.path, overview.coverage
     if path is not None:
-        wording.figure("path", charts.path_chart(path, overview.troubles, ""), main=True)
+        wording.figure("path", charts.path_chart(path, overview.troubles), main=True)
     if coverage is not None and coverage.placed.any():
         report.section("Where it flew, and what it saw")
-        wording.figure("coverage", charts.coverage_chart(coverage, path, ""))
+        wording.figure("coverage", charts.coverage_chart(coverage, path))
     row = [wording.captioned(key, fig) for key, fig in _figures_over_time(overview, clock)]
     for i in range(0, len(row), 2):
         report.figures(
@@ -514,20 +512,18 @@ def _show_figures(wording: Wording, overview: Overview) -> None:
 def _figures_over_time(overview: Overview, clock: charts.Clock) -> Iterator[tuple[str, Figure]]:
     named = {name: pace for name, pace in overview.streams.items() if pace.n}
     if named and overview.flight.manifest.time.kind == "utc":
-        yield "streams", charts.streams_chart(named, clock, "")
+        yield "streams", charts.streams_chart(named, clock)
     if not any(overview.series.values()):
         return
     if height := overview.series["height"]:
         ground = None
         if overview.above is not None and overview.path is not None:
             ground = overview.path.times, -overview.path.place[:, 2] - overview.above[0]
-        yield "height", charts.lines_chart(height, clock, "height (m)", "", ground=ground)
+        yield "height", charts.lines_chart(height, clock, "height (m)", ground=ground)
     if speed := overview.series["speed"]:
-        yield "speed", charts.lines_chart(speed, clock, "speed (m/s)", "", floor=True)
+        yield "speed", charts.lines_chart(speed, clock, "speed (m/s)", floor=True)
     if attitude := overview.series["attitude"]:
-        yield "attitude", charts.attitude_chart(attitude, clock, "")
-    for times, rates in overview.series["turning"].values():
-        yield "turning", charts.turning_chart(times, rates, clock, "")
+        yield "attitude", charts.attitude_chart(attitude, clock)
     gnss = overview.flight.gnss
     if gnss is not None and len(gnss):
         times = gnss_times(overview.flight)
@@ -541,8 +537,7 @@ def _figures_over_time(overview: Overview, clock: charts.Clock) -> Iterator[tupl
         sd = {"each horizontal axis": column("sd_horizontal_m"), "height": column("sd_vertical_m")}
         reported = {name: series for name, series in sd.items() if series is not None}
         if satellites is not None or reported:
-            yield "satellites", charts.satellites_chart(satellites, reported, clock, "")
+            yield "satellites", charts.satellites_chart(satellites, reported, clock)
     if overview.vibration is not None:
         vibration, times = overview.vibration
-        yield "shaking", charts.shaking_chart(vibration, times, clock, "")
-        yield "bands", charts.bands_chart(vibration, "")
+        yield "shaking", charts.shaking_chart(vibration, times, clock)

@@ -7,8 +7,7 @@ from datetime import UTC, datetime
 from typing import Any, NamedTuple
 
 from wildlab.analysis.verdict import Verdict, evidence_of, verdict_of
-from wildlab.reporting.page import PILLS, TAGS, page
-from wildlab.reporting.text import render
+from wildlab.reporting.text import PILLS, TAGS, page, render
 
 #: The page, beside the ledger.
 PAGE = "flights.html"

@@ -8,19 +8,18 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.colors import to_rgba
-from matplotlib.patches import Patch, PathPatch
-from matplotlib.path import Path as Outline
+from matplotlib.colors import ListedColormap
+from matplotlib.patches import Patch
 
 from wildlab.analysis.plans.coverage import Covered
 from wildlab.analysis.plans.plan import Plan
 from wildlab.analysis.plans.result import count, head_count, hectares, minutes, origin_text, percent
-from wildlab.flight.readers.vector import Area
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
 from wildlab.messages.catalogue import Message, load_texts, words
 from wildlab.messages.quantities import NOTHING
 from wildlab.names import figure_name
+from wildlab.reporting.charts.drawing import draw_cells, draw_fences, draw_way, mark_place
 from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, map_axes, new_figure
 from wildlab.reporting.notebook_pages import finished_page
 from wildlab.reporting.report import Wording, open_report
@@ -31,8 +30,6 @@ FLIGHTS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE)
 GROUND = {"seen": "#D6EBDF", "hidden": "#D55E00", "only blurred": "#CC79A7", "in no image": "#F0C24B"}
 #: Places along a flight at which its ground is drawn.
 PLACES = 800
-#: The name of an area needs this share of its size about its middle.
-TAKEN = 0.2
 #: Flights that a key names one by one.
 NAMED = 6
 
@@ -130,32 +127,24 @@ def _tiles(plan: Plan, result: Mapping[str, Any], wording: Wording) -> list[tupl
 
 def _show_map(wording: Wording, plan: Plan, covered: Sequence[Covered], result: Mapping[str, Any]) -> None:
     fig, ax = new_figure(5.8, 5.2)
-    there = [_draw_covered(ax, one) for one in covered]
+    shown = {kind for one in covered for kind in _draw_covered(ax, one)}
     for area, name in zip(plan.areas.areas, plan.names, strict=True):
-        _draw_area(ax, area, name, plan.home)
+        draw_fences(ax, [area.outline, *area.holes])
+        mark_place(ax, area.outline.mean(axis=0), name, below=True)
     many = len(plan.sorties) > NAMED
     for k, one in enumerate(plan.sorties):
-        points, colour = one.course.points, FLIGHTS[k % len(FLIGHTS)]
-        ax.plot(
-            points[:, 1], points[:, 0], color=colour, lw=1.0, label=None if many else figure_name(one.name)
-        )
+        colour = FLIGHTS[k % len(FLIGHTS)]
+        draw_way(ax, one.course.points, colour, "" if many else one.name, width=1.0)
         for row in one.rows:
             _arrow(ax, plan.pattern.rows[row], colour)
     ax.plot(plan.home[1], plan.home[0], "^", color=INK, ms=8, label="take-off", zorder=5)
-    low, high = _drawn(plan)
-    side = high - low
     # Above and to the right there is room for the arrow to the north, below for the scale.
-    ax.set(xlim=(low[1] - 0.06 * side.max(), high[1] + 0.12 * side.max()))
-    ax.set(ylim=(low[0] - 0.17 * side.max(), high[0] + 0.06 * side.max()))
+    ax.margins(0.15)
     map_axes(ax)
     ax.set_aspect("equal", adjustable="box")
     handles, _ = ax.get_legend_handles_labels()
-    shown = np.any(there, axis=0)
-    handles += [
-        Patch(color=c, label=figure_name(what))
-        for (what, c), some in zip(GROUND.items(), shown, strict=True)
-        if some
-    ]
+    ground = [Patch(color=c, label=figure_name(what)) for what, c in GROUND.items()]
+    handles += [ground[kind] for kind in sorted(shown)]
     ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3)
     north, east = np.ptp(np.concatenate([area.outline for area in plan.areas.areas]), axis=0)
     each = " ".join(
@@ -174,36 +163,13 @@ def _show_map(wording: Wording, plan: Plan, covered: Sequence[Covered], result: 
     wording.figure("map", fig, main=True)
 
 
-def _drawn(plan: Plan) -> tuple[Array, Array]:
-    """The least and the greatest north and east of areas, ways and take-off, metres."""
-    points = [area.outline for area in plan.areas.areas] + [one.course.points for one in plan.sorties]
-    every = np.concatenate([*points, plan.home[None]])
-    return every.min(axis=0), every.max(axis=0)
-
-
-def _draw_covered(ax: Axes, one: Covered) -> list[bool]:
-    """The ground of an area, by what becomes of it; whether there is any of each kind."""
-    seen = one.looks > 0
-    kinds = [seen, one.hidden, one.blurred, ~(seen | one.hidden | one.blurred)]
-    colours = np.ones((*one.inside.shape, 4))
-    colours[~one.inside] = 0
-    for which, colour in zip(kinds, GROUND.values(), strict=True):
-        colours[which & one.inside] = to_rgba(colour)
-    half = one.step / 2
-    rows, columns = one.inside.shape
-    ax.imshow(
-        colours,
-        origin="lower",
-        extent=(
-            one.east - half,
-            one.east + columns * one.step - half,
-            one.north - half,
-            one.north + rows * one.step - half,
-        ),
-        interpolation="nearest",
-        zorder=1,
-    )
-    return [bool((which & one.inside).any()) for which in kinds]
+def _draw_covered(ax: Axes, one: Covered) -> set[int]:
+    """Draw the ground of an area by what becomes of it; which of `GROUND` there are."""
+    kind = np.select([one.looks > 0, one.hidden, one.blurred], [0, 1, 2], 3)
+    shown = np.ma.masked_array(kind, ~one.inside)
+    look = {"cmap": ListedColormap(list(GROUND.values())), "vmin": -0.5, "vmax": 3.5, "zorder": 1}
+    draw_cells(ax, shown, one.east, one.north, one.step, **look)
+    return set(np.unique(kind[one.inside]).tolist())
 
 
 def _show_heights(wording: Wording, plan: Plan, terrain: Terrain) -> None:
@@ -230,36 +196,6 @@ def _show_heights(wording: Wording, plan: Plan, terrain: Terrain) -> None:
         "high": f"{top:.0f}",
     }
     wording.figure("heights", fig)
-
-
-def place_name(outline: Array, home: Array) -> Array:
-    """Where the name of an area stands: its middle, or where take-off is, half-way to the farthest corner."""
-    middle = outline.mean(axis=0)
-    if np.linalg.norm(home - middle) > TAKEN * np.ptp(outline, axis=0).max():
-        return np.asarray(middle)
-    away = np.linalg.norm(outline - home, axis=1)
-    return np.asarray((middle + outline[np.argmax(away)]) / 2)
-
-
-def _draw_area(ax: Axes, area: Area, name: str, home: Array) -> None:
-    rings = [area.outline, *area.holes]
-    corners = np.concatenate([np.concatenate([ring, ring[:1]])[:, ::-1] for ring in rings])
-    codes = np.concatenate(
-        [[Outline.MOVETO, *([Outline.LINETO] * (len(ring) - 1)), Outline.CLOSEPOLY] for ring in rings]
-    )
-    # Holes show only where they run the other way round; a line round each says where they are.
-    ax.add_patch(PathPatch(Outline(corners, codes), facecolor="none", edgecolor=INK, lw=1.4, zorder=3))
-    middle = place_name(area.outline, home)
-    ax.annotate(
-        name,
-        xy=(float(middle[1]), float(middle[0])),
-        ha="center",
-        va="center",
-        fontsize=10,
-        color=INK,
-        zorder=6,
-        bbox={"boxstyle": "round,pad=0.2", "fc": "white", "ec": "none", "alpha": 0.75},
-    )
 
 
 def _arrow(ax: Axes, row: Array, colour: str) -> None:

@@ -164,6 +164,10 @@ def judge(row: Mapping[str, Any], ours: Recorded) -> Comparison | None:
     return replace(compared, difference=here - value, fitted=str(row["fitted"]))
 
 
+#: What a number has from the published file.
+_COPIED = ("name", "subject", "unit", "source", "digits", "kind", "by_size", "again", "fitted")
+
+
 def compared_number(row: Mapping[str, Any], ours: Recorded, seeds: int | None, kind: str = "twin") -> Number:
     """A published number beside ours, with both answers.
 
@@ -185,26 +189,16 @@ def compared_number(row: Mapping[str, Any], ours: Recorded, seeds: int | None, k
     over = None
     if found.get("low") is not None:
         over = found["flights"] or seeds or (found["n"] if kind == "twin" else None)
+    copied: dict[str, Any] = {key: row[key] for key in _COPIED}
+    copied |= {key: found.get(key) for key in ("low", "high", "below", "power")}
     return Number(
-        name=row["name"],
-        subject=row["subject"],
-        unit=row["unit"],
-        source=row["source"],
+        **copied,
         published=abs(float(row["value"])) if row["by_size"] else float(row["value"]),
-        digits=int(row["digits"]),
         here=found.get("value"),
-        low=found.get("low"),
-        high=found.get("high"),
         compared=compared,
         waiting=MISSING if compared is None else "",
         reason="" if compared is None else compared.reason,
-        kind=row["kind"],
         ratio=None if compared is None else compared.ratio,
-        below=found.get("below"),
-        power=found.get("power"),
-        by_size=bool(row["by_size"]),
-        again=bool(row["again"]),
-        fitted=row["fitted"],
         over=over,
     )
 

@@ -1,4 +1,10 @@
-"""Published numbers and claims beside ours: how many of how many, and tables of the ledger and of reports."""
+"""Published numbers and claims beside ours: how many of how many, tables, and all numbers at once as marks.
+
+A mark lies on one axis, ours divided by the printed number, logarithmic. Whether a number is close is a
+shape; whether it is within the prediction interval of our flights is a colour, and a ring around what is
+outside, so that neither eyes nor printers that see no colour miss it. What was fitted is underlined. What has
+no ratio (a signed mean, a zero) or was not run is not drawn; whoever draws says how many.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +16,7 @@ from typing import NamedTuple
 from markupsafe import Markup
 
 from wildlab.evaluation.intervals import LEVEL, false_outside
-from wildlab.evaluation.replication import SIZES, Closeness, Compatibility
+from wildlab.evaluation.replication import KINDS, SIZES, Closeness, Compatibility
 from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY, MOSTLY_NOT, UNDECIDED
 from wildlab.messages.catalogue import fill, load_texts, words_of
 from wildlab.messages.quantities import NOTHING, number, unit_words
@@ -24,10 +30,18 @@ from wildlab.reporting.published import (
     quantity_kind,
     spread_key,
 )
-from wildlab.reporting.status import FIRST_LOOK, MISSING, Claim, Number, StudyStatus
+from wildlab.reporting.status import (
+    FIRST_LOOK,
+    MISSING,
+    Claim,
+    Number,
+    Standing,
+    StudyStatus,
+    standing,
+)
 from wildlab.reporting.text import dim, mark_up, pill, render, table
 
-#: What the headline counts: predicted for a flight that nothing of ours was fitted to; then the others.
+#: What tiles count: predicted for a flight that nothing of ours was fitted to; then the others.
 PREDICTED = "sizes, NEES and NIS, predicted"
 SIGNED, PROBABILITIES, CALCULATIONS, FITTED = "signed means", "probabilities", "calculations", "fitted"
 GROUPS = (PREDICTED, SIGNED, PROBABILITIES, CALCULATIONS, FITTED)
@@ -57,6 +71,11 @@ class Tally(NamedTuple):
     chance: float
     unjudged: int
     waiting: int
+
+    @property
+    def judged(self) -> int:
+        """How many have an answer."""
+        return self.all - self.unjudged - self.waiting
 
     @property
     def within(self) -> str:
@@ -113,67 +132,16 @@ def group_of(number: Number) -> str:
     return PREDICTED if kind in SIZES else SIGNED
 
 
-class Counts(NamedTuple):
-    """All published numbers, each counted once, by group; only studies that are done give answers.
-
-    Attributes
-    ----------
-    groups
-        By `GROUPS`; groups without a number are left out.
-    flights
-        How many published flights the answers on `PREDICTED` are about.
-    others
-        Why the rest has no answer, and how many for each reason.
-    """
-
-    groups: dict[str, Tally]
-    flights: int
-    others: dict[str, int]
-
-    @property
-    def all(self) -> int:
-        """How many published numbers there are."""
-        return sum(one.all for one in self.groups.values())
-
-    @property
-    def of(self) -> int:
-        """How many predicted numbers were judged: the denominator of the headline."""
-        found = self.groups.get(PREDICTED)
-        return found.all - found.unjudged - found.waiting if found else 0
+def count_answers(studies: Iterable[StudyStatus]) -> dict[str, Tally]:
+    """All published numbers, each counted once, by `GROUPS`; only studies that are done give answers."""
+    numbers = [one for study in studies for one in study.counted]
+    groups = {group: [one for one in numbers if group_of(one) == group] for group in GROUPS}
+    return {group: tally(those) for group, those in groups.items() if those}
 
 
-def count_answers(studies: Sequence[StudyStatus]) -> Counts:
-    """Count them."""
-    by_group: dict[str, list[Number]] = {group: [] for group in GROUPS}
-    others: Counter[str] = Counter()
-    flights = set()
-    for study in studies:
-        for one in study.counted:
-            group = group_of(one)
-            by_group[group].append(one)
-            judged = one.compared is not None and not one.waiting and one.answers[0] != one.answers[1]
-            if judged and group == PREDICTED:
-                flights.add(study.study.twin or study.study.name)
-            elif not judged:
-                state = _WAITING.get(study.state, study.state)
-                done = "not given by its study yet" if one.waiting else "not judged"
-                others[done if study.state == "done" else state] += 1
-    groups = {group: tally(numbers) for group, numbers in by_group.items() if numbers}
-    return Counts(groups, len(flights), dict(others.most_common()))
-
-
-_WAITING = {
-    FIRST_LOOK: "seen in a first look only, from fewer flights than the study's own",
-    "not run": "of studies not run yet",
-    "failed": "of studies that failed",
-    "broken off": "of studies that were broken off",
-    "damaged": "of studies whose report is not as it was written",
-}
-
-
-def groups_table(counts: Counts) -> Markup:
+def groups_table(counts: Mapping[str, Tally]) -> Markup:
     """The answers by group, as HTML; "" where none was given."""
-    rows = [(group, one) for group, one in counts.groups.items() if one.close or one.compatible]
+    rows = [(group, one) for group, one in counts.items() if one.close or one.compatible]
     if not rows:
         return Markup()
     answers = [*CLOSE, *COMPATIBLE]
@@ -193,33 +161,21 @@ def groups_table(counts: Counts) -> Markup:
 
 #: A longer table is folded away behind a line that sums it up.
 LONGEST = 12
-#: Answers and verdicts, and the colour of each: for, in part, against; what is not here decides nothing.
-PILLS = {
-    Closeness.CLOSE: "yes",
-    Closeness.NOT_CLOSE: "no",
-    Compatibility.WITHIN: "yes",
-    Compatibility.OUTSIDE: "no",
-    HOLDS: "yes",
-    MOSTLY: "part",
-    UNDECIDED: "part",
-    MOSTLY_NOT: "no",
-    FAILS: "no",
-    FIRST_LOOK: "part",
+#: A sign and a colour for each answer, so that neither tells alone.
+SIGNS: Mapping[str, tuple[str, str]] = {
+    Closeness.CLOSE: ("✓", "yes"),
+    Closeness.NOT_CLOSE: ("✗", "no"),
+    Compatibility.WITHIN: ("✓", "yes"),
+    Compatibility.OUTSIDE: ("✗", "no"),
+    **dict.fromkeys((Closeness.CANNOT_TELL, Compatibility.TOO_FEW, Compatibility.NO_POWER), ("?", "part")),
 }
+#: Colours of verdicts on claims; what is not here decides nothing.
+PILLS: Mapping[str, str] = {
+    HOLDS: "yes", FAILS: "no", MOSTLY_NOT: "no", **dict.fromkeys((MOSTLY, UNDECIDED, FIRST_LOOK), "part"),
+}  # fmt: skip
 #: The axis of every strip: ratios to the printed number from 1/8 to 8, logarithmic, and its width in pixels.
 WIDEST, WIDTH = 8.0, 160.0
 _MARGIN = 8.0
-
-
-def numbers_table(one: StudyStatus) -> Markup:
-    """The published numbers of a study beside ours; nothing where there are none."""
-    if not one.numbers:
-        return Markup()
-    heads = ["quantity", "published"]
-    if one.ran:
-        heads += ["here", "ratio, or difference", _strip_heading(one), "flights below", "close? within 90 %?"]
-    rows = [_ledger_row(number, ran=one.ran) for number in one.numbers]
-    return table(heads, rows, f"Published numbers of {one.study.name}", text=(0, 6))
 
 
 def summed_up(one: StudyStatus) -> str:
@@ -238,11 +194,59 @@ def summed_up(one: StudyStatus) -> str:
     return f"{numbers}: {'; '.join(part for part in parts if part)}"
 
 
-def _strip_heading(one: StudyStatus) -> Markup:
-    over = f"{one.seeds} {flights_of(one)}" if one.seeds and one.seeds > 1 else "here"
-    fewest = min((n.over for n in one.numbers if n.over is not None), default=MANY)
-    band = spread_key(fewest) if any(has_band(n) for n in one.numbers) else ""
-    return render("strip-heading", over=over, band=band)
+def published_table(
+    numbers: Sequence[Number],
+    subjects: Mapping[str, str] | None = None,
+    quantities: Mapping[str, str] | None = None,
+    *,
+    ledger: bool = False,
+) -> Markup:
+    """A row for each published number beside ours; "" where there are none.
+
+    Parameters
+    ----------
+    numbers
+        From `wildlab.reporting.published.compared_number`, in the order of the table.
+    subjects, quantities
+        Words for their subjects and names; what has none goes by its name.
+    ledger
+        Whether each says where it is printed, and what its answers rest on.
+    """
+    if not numbers:
+        return Markup()
+    shown = "published ○, here ●" + (", range ▬" if any(map(has_band, numbers)) else "")
+    rows = [_row(one, subjects or {}, quantities or {}, ledger=ledger) for one in numbers]
+    heads = ["", "", "published", "here", shown, "close", "within"]
+    return table(heads, rows, "Published numbers and ours", text=(0, 1, 5, 6), many=True)
+
+
+def _row(
+    one: Number, subjects: Mapping[str, str], quantities: Mapping[str, str], *, ledger: bool
+) -> tuple[object, ...]:
+    unit = unit_words(one.unit).strip()
+    quantity = words_of(quantities, one.name) + (f" ({unit})" if unit else "")
+    quantity += ", size" if one.by_size else ""
+    cells = (
+        mark_up(words_of(subjects, one.subject)),
+        with_source(quantity, one.source if ledger else ""),
+        number(one.published, one.digits),
+    )
+    if one.here is None:
+        return (*cells, f"{MISSING} ({one.reason})" if one.reason else MISSING)
+    near, inside = (_sign(answer) for answer in one.answers)
+    why = one.reason if ledger else ""
+    notes = [f"fitted: {one.fitted}" if ledger else "fitted"] if one.fitted else []
+    notes += [*filter(None, [why]), *(["counted elsewhere"] if one.again else [])]
+    return (
+        *cells, number(one.here, one.digits + 1), strip(one), near, inside + dim(f" {'; '.join(notes)}"),
+    )  # fmt: skip
+
+
+def _sign(answer: str) -> Markup:
+    if answer not in SIGNS:
+        return dim(answer) if answer != Closeness.NOT_JUDGED else Markup(NOTHING)  # noqa: S704 - a dash
+    sign, colour = SIGNS[answer]
+    return Markup('<span class="pill {}" role="img" aria-label="{}">{}</span>').format(colour, answer, sign)
 
 
 def flights_of(one: StudyStatus) -> str:
@@ -255,44 +259,10 @@ def has_band(n: Number) -> bool:
     return n.low is not None and n.high is not None and n.kind not in (SHARE_OF_IMAGES, CALCULATED)
 
 
-def _ledger_row(n: Number, *, ran: bool) -> list[object]:
-    size = ", by size" if n.by_size else ""
-    quantity = f"{n.name.replace('_', ' ')}{size}, {n.subject}"
-    unit = f" {n.unit}" if n.unit else ""
-    cells: list[object] = [_with_source(quantity, n.source), f"{number(n.published, n.digits)}{unit}"]
-    if ran and n.here is None:
-        return [*cells, f"{MISSING} ({n.reason})" if n.reason else MISSING]
-    if ran:
-        below = NOTHING if n.below is None else f"{100 * n.below:.0f} %"
-        here = f"{number(n.here, n.digits + 1)}{unit}"
-        cells += [here, _ratio(n, unit), strip(n), below, _answers(n) + " " + dim(_why(n))]
-    return cells
-
-
-def _with_source(text: str, source: str) -> Markup:
+def with_source(text: str, source: str) -> Markup:
     """A quantity or a claim, and where it is printed."""
     where = Markup(' <span class="dim source">{}</span>').format(source) if source else ""
-    return Markup("{}{}").format(text, where)
-
-
-def _ratio(n: Number, unit: str) -> str:
-    if n.ratio is not None or n.here is None:
-        return number(n.ratio, 2)
-    off = n.here - n.published
-    return f"{'+' if off > 0 else '−' if off < 0 else ''}{number(abs(off), n.digits + 1)}{unit}"
-
-
-def _answers(n: Number) -> Markup:
-    """Both answers, or once what a number waits for; what is not asked of it is left out."""
-    near, inside = n.answers
-    asked = [near] if near == inside else [one for one in (near, inside) if one != "not judged"]
-    return Markup(" ").join(pill(one, PILLS.get(one, "")) for one in asked)
-
-
-def _why(n: Number) -> str:
-    """What the answers rest on, and whether the number is fitted or counted elsewhere."""
-    parts = ["fitted: " + n.fitted if n.fitted else "", n.reason, "counted once" if n.again else ""]
-    return "; ".join(part for part in parts if part)
+    return Markup("{}{}").format(mark_up(text), where)
 
 
 def place(ratio: float, width: float = WIDTH, margin: float = _MARGIN) -> float:
@@ -306,11 +276,7 @@ def strip(n: Number) -> Markup | str:
     number hollow and in the middle, the spread over flights a band. An arrow stands for what lies beyond."""
     if n.ratio is None or n.published <= 0:
         return NOTHING
-    words = [
-        f"published {number(n.published, n.digits)}",
-        f"here {number(n.here, n.digits + 1)}",
-        f"ratio {n.ratio:.2f}",
-    ]
+    words = [f"here {number(n.here, n.digits + 1)}", f"ratio {n.ratio:.2f}"]
     band = None
     if has_band(n):
         band = place(n.low / n.published), place(n.high / n.published)  # type: ignore[operator]
@@ -327,23 +293,8 @@ def strip(n: Number) -> Markup | str:
     )
 
 
-def claims_table(claims: list[Claim], flights: str = "flights", study: str = "") -> Markup:
-    """Claims of a study, the verdict on each, and on how many flights it is true; "" where there are none."""
-    if not claims:
-        return Markup()
-    rows = [
-        (
-            _with_source(one.text + (" (ours, not the thesis's)" if one.own else ""), one.source),
-            # The verdict stands beside the claim: on a phone the last column may be out of sight.
-            pill(one.verdict, PILLS.get(one.verdict, "")),
-            _tested_on(one, flights),
-        )
-        for one in claims
-    ]
-    return table(["claim", "verdict", "true on"], rows, f"Claims of {study}", text=(0, 1), wide=True)
-
-
-def _tested_on(one: Claim, flights: str) -> str:
+def tested_on(one: Claim, flights: str) -> str:
+    """On how many flights a claim is true."""
     if one.fraction is None:
         return f"{one.met} of {one.seeds} {flights} meet the premise" if one.met is not None else ""
     share = f"{100 * one.fraction:.0f} %"
@@ -356,43 +307,7 @@ def _tested_on(one: Claim, flights: str) -> str:
     return f"{share} of {of} {flights}{beyond}"
 
 
-#: A sign and a colour for each answer, so that neither tells alone.
-SIGNS: Mapping[str, tuple[str, str]] = {
-    Closeness.CLOSE: ("✓", "yes"),
-    Closeness.NOT_CLOSE: ("✗", "no"),
-    Closeness.CANNOT_TELL: ("?", "part"),
-    Compatibility.WITHIN: ("✓", "yes"),
-    Compatibility.OUTSIDE: ("✗", "no"),
-    Compatibility.TOO_FEW: ("?", "part"),
-    Compatibility.NO_POWER: ("?", "part"),
-}
-
-
-def published_table(
-    numbers: Sequence[Number], subjects: Mapping[str, str], quantities: Mapping[str, str]
-) -> Markup:
-    """A row for each published number; "" where there are none.
-
-    Parameters
-    ----------
-    numbers
-        From `wildlab.reporting.published.compared_number`, in the order of the table.
-    subjects, quantities
-        Words for their subjects and names; what has none goes by its name.
-    """
-    if not numbers:
-        return Markup()
-    shown = "published ○, here ●" + (", range ▬" if any(map(has_band, numbers)) else "")
-    return table(
-        ["", "", "published", "here", shown, "close", "within"],
-        [_report_row(one, subjects, quantities) for one in numbers],
-        "Published numbers and ours",
-        text=(0, 1, 5, 6),
-        many=True,
-    )
-
-
-def effects_table(rows: Sequence[tuple[str, str, str, str, str]]) -> Markup:
+def claims_table(rows: Sequence[tuple[str, str, str, str, str]]) -> Markup:
     """A row for each claim: its text and source, the verdict, on how much it is true, and the difference.
 
     Parameters
@@ -403,7 +318,7 @@ def effects_table(rows: Sequence[tuple[str, str, str, str, str]]) -> Markup:
     """
     filled = max((2 + (2 if one[4] else 1 if one[3] else 0) for one in rows), default=2)
     cells = [
-        (_with_source(text, source), pill(verdict, PILLS.get(verdict, "")), *map(mark_up, effects))[:filled]
+        (with_source(text, source), pill(verdict, PILLS.get(verdict, "")), *map(mark_up, effects))[:filled]
         for text, source, verdict, *effects in rows
     ]
     heads = ("claim", "verdict", "true on", "difference")[:filled]
@@ -413,35 +328,150 @@ def effects_table(rows: Sequence[tuple[str, str, str, str, str]]) -> Markup:
 def caption_of(numbers: Sequence[Number]) -> str:
     """What *close* and *within* mean for the kinds of numbers that there are, and where these are from."""
     texts = load_texts("published").answers
-    kinds = list(dict.fromkeys(one.kind for one in numbers))
-    said = [texts[kind.replace(" ", "-")] for kind in kinds]
-    return " ".join([*said, texts["signs"], fill(texts["sources"], {}, {"sources": sources_of(numbers)})])
+    said = [texts[kind.replace(" ", "-")] for kind in dict.fromkeys(one.kind for one in numbers)]
+    sources = listed(list(dict.fromkeys(one.source for one in numbers)))
+    return " ".join([*said, texts["signs"], fill(texts["sources"], {}, {"sources": sources})])
 
 
-def sources_of(numbers: Sequence[Number]) -> str:
-    """The tables that the published numbers are from: "H table 7.5 and H table 7.6"."""
-    return listed(list(dict.fromkeys(one.source for one in numbers)))
+#: Answers to "close?" in the order in which they are drawn, the last on top, and how each is drawn.
+SHAPES: dict[str, tuple[str, str]] = {
+    FIRST_LOOK: ("look", "M0-3.6 3.6 0 0 3.6-3.6 0Z"),
+    Closeness.NOT_JUDGED: ("none", "M-3-3H3V3H-3Z"),
+    Closeness.CANNOT_TELL: ("vague", "M0-3.2a3.2 3.2 0 1 1-.01 0Z"),
+    Closeness.NOT_CLOSE: ("off", "M-3.6-3.6 3.6 3.6M3.6-3.6-3.6 3.6"),
+    Closeness.CLOSE: ("same", "M0-3.6a3.6 3.6 0 1 1-.01 0Z"),
+}
+#: Around what is outside; below what is fitted.
+RING, UNDERLINE = "M0-5.4a5.4 5.4 0 1 1-.01 0Z", "M-4 6.4H4"
+#: What the axis says, by ratio.
+TICKS = {1 / 8: "⅛", 1 / 4: "¼", 1 / 2: "½", 1.0: "published", 2.0: "2×", 4.0: "4×", 8.0: "8×"}
+#: The margin of most published numbers, the size of an error; it is shaded.
+MARGIN = KINDS["error size"].factor
+#: Half of a mark, and how far its neighbours are, in units of the drawing.
+_HALF, _APART = 6.0, 8.6
+#: The width of their axis, in units.
+MARKS_WIDTH = 320.0
+#: Rows of marks on an axis at most; beyond that, marks overlap.
+MOST_LEVELS = 5
 
 
-def _report_row(
-    one: Number, subjects: Mapping[str, str], quantities: Mapping[str, str]
-) -> tuple[object, ...]:
-    unit = unit_words(one.unit).strip()
-    quantity = words_of(quantities, one.name) + (f" ({unit})" if unit else "")
-    near, inside = one.answers
-    return (
-        mark_up(words_of(subjects, one.subject)),
-        mark_up(quantity + (", size" if one.by_size else "")),
-        number(one.published, one.digits),
-        number(one.here, one.digits + 1),
-        strip(one),
-        _sign(near) + (" fitted" if one.fitted else ""),
-        _sign(inside) + (dim(" counted elsewhere") if one.again else ""),
+class Mark(NamedTuple):
+    """A number drawn: where (units from the left, and from the middle down), both answers, whether it is
+    fitted, and whether the axis ends before it (-1 left, 1 right, 0 not)."""
+
+    x: float
+    y: float
+    closeness: str
+    compatibility: str
+    fitted: bool
+    beyond: int
+
+
+def drawable(numbers: Iterable[Number]) -> list[Number]:
+    """Those with a ratio and a shape."""
+    return [one for one in numbers if one.ratio is not None and one.ratio > 0 and one.answers[0] in SHAPES]
+
+
+def arrange_marks(numbers: Sequence[Number], levels: int) -> list[Mark]:
+    """Marks for numbers, beside one another where they would hide each other.
+
+    Parameters
+    ----------
+    numbers
+        From `drawable`.
+    levels
+        Rows of marks there is room for, an odd number; beyond that, marks overlap.
+
+    Returns
+    -------
+    list of Mark
+        In the order of `SHAPES`, and of the numbers.
+    """
+    middle_first = sorted(range(levels), key=lambda k: (abs(k - levels // 2), k))
+    taken: dict[int, list[float]] = {k: [] for k in range(levels)}
+    order = list(SHAPES)
+    marks = []
+    for one in sorted(numbers, key=lambda n: order.index(n.answers[0]), reverse=True):
+        ratio = one.ratio or 0.0  # `drawable` has left out those without
+        x = place(ratio, MARKS_WIDTH, _HALF)
+        crowd = {k: sum(abs(x - other) < _APART for other in taken[k]) for k in middle_first}
+        level = min(middle_first, key=lambda k: crowd[k])
+        taken[level].append(x)
+        beyond = 1 if ratio > WIDEST else -1 if ratio < 1 / WIDEST else 0
+        marks.append(Mark(x, (level - levels // 2) * _APART, *one.answers, bool(one.fitted), beyond))
+    return marks[::-1]
+
+
+def levels_for(numbers: Sequence[Number], most: int = MOST_LEVELS) -> int:
+    """Rows of marks that numbers need so that none hides another, odd, and at most so many."""
+    for levels in range(1, most, 2):
+        marks = arrange_marks(numbers, levels)
+        if all(abs(a.x - b.x) >= _APART or a.y != b.y for i, a in enumerate(marks) for b in marks[:i]):
+            return levels
+    return most
+
+
+def marks_plot(numbers: Iterable[Number], *, alt: str) -> Markup:
+    """Numbers as marks on the axis, an SVG element, and the axis in words below it.
+
+    Parameters
+    ----------
+    numbers
+        Those that cannot be drawn are left out.
+    alt
+        What a reader who cannot see it should know.
+    """
+    shown = drawable(numbers)
+    levels = levels_for(shown)
+    height = levels * _APART + 5
+    return render(
+        "marks",
+        alt=alt,
+        width=MARKS_WIDTH,
+        height=height,
+        axis=[("one" if ratio == 1 else "axis", place(ratio, MARKS_WIDTH, _HALF)) for ratio in TICKS],
+        ticks=[
+            (100 * place(ratio, MARKS_WIDTH, _HALF) / MARKS_WIDTH, one, ratio in (1 / 2, 2.0))
+            for ratio, one in TICKS.items()
+            if ratio not in (1 / 4, 4.0)
+        ],
+        near=(place(1 / MARGIN, MARKS_WIDTH, _HALF), place(MARGIN, MARKS_WIDTH, _HALF)),
+        marks=[
+            (one, height / 2 + one.y, mark_symbol(one.closeness, one.compatibility, one.fitted))
+            for one in arrange_marks(shown, levels)
+        ],
     )
 
 
-def _sign(answer: str) -> Markup:
-    if answer not in SIGNS:
-        return dim(answer) if answer != Closeness.NOT_JUDGED else Markup(NOTHING)  # noqa: S704 - a dash
-    sign, colour = SIGNS[answer]
-    return Markup('<span class="pill {}" role="img" aria-label="{}">{}</span>').format(colour, answer, sign)
+def mark_symbol(closeness: str, compatibility: str, fitted: bool) -> Markup:
+    """The shape of both answers about the origin, an SVG group."""
+    name, path = SHAPES[closeness]
+    state = compatibility if compatibility in ("within", "outside") else ""
+    # A calculation has no flights to be within: its one answer has the colour as well.
+    if compatibility == Compatibility.NOT_JUDGED and closeness != Closeness.NOT_JUDGED:
+        state = {Closeness.CLOSE: "within", Closeness.NOT_CLOSE: "outside"}.get(Closeness(closeness), "")
+    ring = RING if compatibility == Compatibility.OUTSIDE else ""
+    below = UNDERLINE if fitted else ""
+    return render("mark", state=state, name=name, path=path, ring=ring, below=below)
+
+
+def marks_legend(numbers: Iterable[Number]) -> Markup:
+    """What each symbol means, of those that occur among some numbers, and the shaded margin; as HTML."""
+    shown = drawable(numbers)
+    near, inside = ({one.answers[k] for one in shown} for k in (0, 1))
+    return render(
+        "legend",
+        key=[(mark_symbol(one, "", False), one) for one in reversed(SHAPES) if one in near],
+        within=mark_symbol(Closeness.CLOSE, Compatibility.WITHIN, False) if "within" in inside else "",
+        ring=RING if "outside" in inside else "",
+        underline=UNDERLINE if any(one.fitted for one in shown) else "",
+        close=MARGIN,
+    )
+
+
+def study_verdict(one: StudyStatus) -> Standing:
+    """What a study's numbers and claims come to, as its report says it; a first look comes to nothing yet."""
+    if one.state == FIRST_LOOK:
+        return Standing("first look", f"{one.first_look}: not counted yet.", "warn")
+    compared = [n.compared for n in one.counted if n.compared is not None]
+    return standing(compared, (c.verdict for c in one.claims if not c.own))

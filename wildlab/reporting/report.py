@@ -29,17 +29,18 @@ import pandas as pd
 from matplotlib import rcParams
 from matplotlib.figure import Figure
 
+from wildlab.analysis.verdict import VERDICT_LEVEL, Verdict
 from wildlab.errors import WildlabError
+from wildlab.files import write_json
 from wildlab.messages.catalogue import Message, PageTexts, fill
 from wildlab.messages.quantities import known
 from wildlab.reporting import metrics as schema
 from wildlab.reporting.figures import figure_html, png_bytes, save_figure
 from wildlab.reporting.layout import ALERT, LIMITS, METHOD, VERDICT
-from wildlab.reporting.page import PILLS, TAGS
 from wildlab.reporting.published import compared_number, judge, load_claims, published_rows
-from wildlab.reporting.published_tables import LONGEST, caption_of, effects_table, published_table
+from wildlab.reporting.published_tables import LONGEST, caption_of, claims_table, published_table
 from wildlab.reporting.status import Standing, standing
-from wildlab.reporting.text import csv_link, escape, inline, maths, prose, slug, table_html
+from wildlab.reporting.text import PILLS, TAGS, csv_link, escape, inline, prose, slug, table_html
 
 LEVELS = ("good", "warn", "bad", "neutral")
 #: What is said where no number is known that anything could be said by.
@@ -305,15 +306,7 @@ class Report:
             for one in self._claims
         ]
         self.section(title)
-        self._show(f'<figure class="table">{effects_table(rows)}</figure>')
-
-    def files(self, intro: str, links: Sequence[str]) -> None:
-        """Files that the page itself hands over, each from `wildlab.reporting.text.data_link`."""
-        self._show(f'<p>{inline(intro)} <span class="get">{" ".join(links)}</span></p>')
-
-    def math(self, latex: str) -> None:
-        """A formula on a line of its own."""
-        self._show(maths(latex, block=True))
+        self._show(f'<figure class="table">{claims_table(rows)}</figure>')
 
     def limits(self, points: Iterable[str]) -> None:
         """What this report does not tell."""
@@ -393,7 +386,7 @@ class Report:
             claims=self._claims,
         )
         if self.out is not None:
-            schema.write_metrics(self.out / "metrics.json", content)
+            write_json(self.out / "metrics.json", content)
 
     # -- inside
     # -------------------------------------------------------------------------------------------------
@@ -415,7 +408,6 @@ class Report:
         ordinal = len(self._figures)
         png = save_figure(fig, self.out / "figures", name) if self.out is not None else png_bytes(fig)
         html = figure_html(fig, png, ordinal=ordinal, alt=alt, caption=caption, main=main)
-        _close(fig)
         return html
 
     def _show(self, *html: str) -> None:
@@ -433,12 +425,6 @@ class Report:
 def _list(points: Iterable[str], tag: str = "ul") -> str:
     items = [f"<li>{inline(point)}</li>" for point in map(known, points) if point]
     return f"<{tag}>{''.join(items)}</{tag}>" if items else ""
-
-
-def _close(fig: Figure) -> None:
-    pyplot = sys.modules.get("matplotlib.pyplot")
-    if pyplot is not None:
-        pyplot.close(fig)
 
 
 _FIGURE = re.compile(r"fig-([0-9a-c])-([0-9]+[a-z]?)")
@@ -478,6 +464,13 @@ class Wording:
         """
         return [self.say(self.texts.answers[one.key], one.values) for one in messages]
 
+    def summary(self, answers: Sequence[Message], verdict: Verdict, reason: Message, about: str = "") -> None:
+        """The answer with its verdict and the reason for it, recorded as that ``about`` something."""
+        (why,) = self.messages([reason])
+        self.report.summary(self.messages(answers), verdict.colour, (verdict.value, why))
+        if about:
+            self.report.metric(VERDICT_LEVEL, about, verdict.level, "1")
+
     def captioned(self, key: str, fig: Figure, name: str = "") -> tuple[Figure, str, str, str]:
         """A figure with its file's name (the key where empty), alt text and caption; its title is set."""
         text, name = self.texts.figures[key], name or key
@@ -494,7 +487,9 @@ class Wording:
         self.report.figure(fig, name=name, alt=alt, caption=caption, main=main)
 
     def table(self, key: str, frame: pd.DataFrame, values: Mapping[str, Any] | None = None) -> None:
-        """Show a table: in sight under its title, or folded away behind it."""
+        """Show a table that has rows: in sight under its title, or folded away behind it."""
+        if frame.empty:
+            return
         text = self.texts.tables[key]
         title, caption = self.say(text.title, values), self.say(text.caption, values)
         columns = {name: self.say(heading, values) for name, heading in text.columns.items()} or None

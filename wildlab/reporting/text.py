@@ -1,7 +1,10 @@
-"""Text and tables that are safe to put into a page: everything escaped, three marks allowed.
+"""Text, tables and the frame of a page, all safe: everything escaped, three marks allowed, nothing asked for.
 
 Names of flights, targets and columns come out of other people's logs. They reach a page through the functions
-below and no other way, so that ``<script>`` in a target's name is a strange name and nothing more.
+below and no other way, so that ``<script>`` in a target's name is a strange name and nothing more. What is
+more than a few elements is a template of ``data/pages``, which escapes whatever is put into it. Reports,
+failure pages and the ledger all come out of `page`, so a page that asks the network for something, or runs
+something, cannot be made by accident: the policy in its head forbids both.
 """
 
 from __future__ import annotations
@@ -105,8 +108,8 @@ def slug(text: str) -> str:
     return re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-") or "part"
 
 
-#: Bytes of a file that is put into a link; larger ones are not embedded.
-MOST_BYTES = 500_000
+#: Bytes of a file that is put into a link, and how its address begins: a table, which no browser runs.
+MOST_BYTES, HANDED_OVER = 500_000, "data:text/csv;base64,"
 #: Columns of a table that still fits a phone beside one another.
 NARROW = 3
 #: Columns that say where on Earth something is: they are in no link.
@@ -257,29 +260,11 @@ def csv_link(frame: pd.DataFrame, name: str, words: str = "CSV") -> str:
     str
         ``<a download>`` with the file within.
     """
-    if frame.empty or any(_PLACES.match(str(column)) for column in frame):
-        return ""
-    return data_link(csv_text(frame).encode("utf-8"), "text/csv", f"{slug(name)}.csv", words)
-
-
-def data_link(content: bytes, kind: str, name: str, words: str) -> str:
-    """A link with a file within; "" where the file is too large for that.
-
-    Parameters
-    ----------
-    content
-        Of the file.
-    kind
-        ``text/csv`` or ``application/geo+json``.
-    name
-        It is saved under.
-    words
-        Of the link.
-    """
-    if len(content) > MOST_BYTES:
+    content = csv_text(frame).encode("utf-8")
+    if frame.empty or len(content) > MOST_BYTES or any(_PLACES.match(str(column)) for column in frame):
         return ""
     data = base64.b64encode(content).decode("ascii")
-    return f'<a class="data" download="{escape(name)}" href="data:{kind};base64,{data}">{escape(words)}</a>'
+    return f'<a class="data" download="{slug(name)}.csv" href="{HANDED_OVER}{data}">{escape(words)}</a>'
 
 
 def _cell(value: object) -> Markup | str:
@@ -290,3 +275,79 @@ def _cell(value: object) -> Markup | str:
     if value is None or (isinstance(value, float) and value != value) or value is pd.NaT or value is pd.NA:
         return NOTHING
     return mark_up(known(str(value))) or (NOTHING if str(value) else "")
+
+
+POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
+
+#: What each kind of report is called.
+TAGS = {
+    "logged": "logged flight",
+    "twin": "simulated flight (twin)",
+    "computed": "computed, no flight",
+    "images": "images",
+}
+
+#: The pill that goes with the colour of a bar.
+PILLS = {"good": "yes", "warn": "part", "bad": "no", "neutral": ""}
+#: How every page looks.
+STYLE = read_style("page")
+
+
+def first_look_notice(look: str, again: str) -> str:
+    """What is said of a first look, as HTML.
+
+    Parameters
+    ----------
+    look
+        What it shows of what: "5 of 200 flights".
+    again
+        What to type for the full numbers.
+    """
+    return render("first-look", look=look, again=again)
+
+
+def page(*, title: str, body: str, kicker: str = "", footer: str = "", style: str = "") -> str:
+    """A whole HTML document.
+
+    Parameters
+    ----------
+    title
+        Text of ``<title>``; escaped here.
+    body, kicker, footer
+        HTML, made of `wildlab.reporting.text` pieces. ``kicker`` is the line above the ``<h1>`` in ``body``.
+    style
+        CSS that this page has besides `STYLE`.
+    """
+    parts = {"body": body, "kicker": kicker, "footer": footer, "style": f"{STYLE}\n{style}".strip()}
+    return (
+        render(
+            "page",
+            title=title,
+            policy=POLICY,
+            **{name: Markup(part) for name, part in parts.items()},  # noqa: S704 - HTML, as the caller says
+        )
+        + "\n"
+    )
+
+
+def failure_page(
+    status: dict[str, Any], *, title: str, step: str, details: str, again: str, footer: str = ""
+) -> str:
+    """The whole page.
+
+    Parameters
+    ----------
+    status
+        Content of ``status.json``; its ``reason`` is the sentence shown.
+    title
+        The study's title.
+    step
+        Heading near which it stopped; "" where it did not get that far.
+    details
+        For whoever mends it: the traceback.
+    again
+        What to type to run it again.
+    """
+    body = render("failure", status=status, title=title, step=step, details=details.strip(), again=again)
+    kicker = f"wildlab › {escape(str(status['study']))}"
+    return page(title=f"Failed: {title}", body=body, kicker=kicker, footer=footer)

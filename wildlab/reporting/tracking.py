@@ -32,7 +32,6 @@ from wildlab.flight.store import Flight
 from wildlab.messages.catalogue import Message, load_texts
 from wildlab.messages.quantities import NOTHING, length, significant
 from wildlab.reporting.charts import following as charts
-from wildlab.reporting.charts.following import beside_plain_shown
 from wildlab.reporting.figures import filter_words
 from wildlab.reporting.report import Report, Wording
 
@@ -493,9 +492,8 @@ def _show_figures(
         tracks = [one for one in followed.tracks if (one.sensor, one.target) == (sensor, target)]
         figures = [charts.squares_shown(tracks, rows, "nis")]
         if any(np.isfinite(one.nees).any() for one in tracks):
-            beside = beside_plain_shown(tracks)
             errors = [charts.errors_shown(tracks, rows), charts.squares_shown(tracks, rows, "nees")]
-            figures = [*errors, *figures, *([beside] if beside else [])]
+            figures = [*errors, *figures]
         if sensor in followed.scans and (
             white := charts.whiteness_shown(tracks, followed.scans[sensor].elements)
         ):

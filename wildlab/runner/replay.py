@@ -18,14 +18,13 @@ from wildlab.files import write_atomic
 from wildlab.flight.manifest import FILE_NAME
 from wildlab.flight.store import Flight, load_flight
 from wildlab.paths import REPORTS
-from wildlab.replay.images import Shot, read_shots
+from wildlab.replay.images import read_shots
 from wildlab.replay.page import page
-from wildlab.replay.recording import save_recording
 from wildlab.replay.scene import ReplayScene, scene_of
 from wildlab.runner.evaluate import tell_source
 from wildlab.runner.record.provenance import flight_of_report, provenance_of_flight, read_provenance
 
-RECORDING, PAGE, ESTIMATES = "replay.rrd", "replay.html", "estimates.parquet"
+PAGE, ESTIMATES = "replay.html", "estimates.parquet"
 
 
 def replay(
@@ -36,8 +35,8 @@ def replay(
     source: str | None = None,
     reports: Path = REPORTS,
     console: Console | None = None,
-) -> tuple[list[Path], ReplayScene]:
-    """Write the replay of a flight: a page, and a recording for rerun's viewer.
+) -> tuple[Path, ReplayScene]:
+    """Write the replay of a flight, a page.
 
     Parameters
     ----------
@@ -56,8 +55,8 @@ def replay(
 
     Returns
     -------
-    files, scene
-        What was written, and what it shows.
+    file, scene
+        The page, and what it shows.
 
     Raises
     ------
@@ -81,15 +80,13 @@ def replay(
                 field="--out",
             )
         target.mkdir(parents=True, exist_ok=True)
-        written = [target / PAGE, target / RECORDING]
-        write_atomic(written[0], page(scene, shots))
-        save_recording(scene, written[1], shots, lambda what: tell(f"writing {what}", None, None))
-    return written, scene
+        write_atomic(target / PAGE, page(scene, shots))
+    return target / PAGE, scene
 
 
 def _with_images(
     scene: ReplayScene, flight: Path, images: Path | None, tell: Any
-) -> tuple[ReplayScene, dict[int, Shot]]:
+) -> tuple[ReplayScene, dict[int, bytes]]:
     own = flight / "images"
     place = images or (own if own.is_dir() else None)
     if scene.views is None:
@@ -98,7 +95,9 @@ def _with_images(
         lacks = "pictures: they are not in the flight folder; --images names where they are"
         return replace(scene, lacks=(*scene.lacks, lacks)), {}
     size = None if scene.camera is None else (scene.camera.width, scene.camera.height)
-    found = read_shots(place, list(scene.views.ids), size, lambda done, of: tell("reducing images", done, of))
+    seen = set() if scene.sightings is None else set(scene.sightings.frame.tolist())
+    ids = list(scene.views.ids)
+    found = read_shots(place, ids, size, seen, lambda done, of: tell("reducing images", done, of))
     return replace(scene, lacks=(*scene.lacks, *found.lacks)), found.by_row
 
 

@@ -29,18 +29,13 @@ from wildlab.reporting.text import escape
 from wildlab.sharing.names import KINDS
 
 _VOID = frozenset(("br", "img"))
-#: Numbers to a tenth, of so many digits, in the lines of a drawing.
-_DRAWN = (
-    r"(?:[), ;]{{0,3}}+(?:translate\(|rotate\(|[MLHVZCSQTAmlhvzcsqta]{{1,2}})?+-?+"
-    r"(?:{}(?:\.\d)?|\.\d\d?)(?!\.?\d))*+[Zz); ]{{0,3}}"
-)
+#: Numbers to a tenth, of four digits, in the lines of a drawing.
+_DRAWN = r"(?:[, ]{0,3}+[MLHVZCSQTAmlhvzcsqta]{0,2}+-?+(?:1?\d{1,3}(?:\.\d)?|\.\d\d?)(?!\.?\d))*+[Zz ]{0,3}"
 #: What an attribute may be, by what it holds; `Writer` has functions for the other kinds.
 FORMS = {
     "word": re.compile(r"[A-Za-z][\w-]{0,40}(?: [A-Za-z][\w-]{0,40}){0,4}"),
     "size": re.compile(r"-?\d{0,4}(?:\.\d{1,3})?(?:em|rem|px|%)?"),
-    "paper": re.compile(_DRAWN.format(r"1?\d{1,3}")),
-    # Degrees of what turns many times; `wildlab.sharing.scan` looks at large ones.
-    "turns": re.compile(_DRAWN.format(r"\d{1,5}")),
+    "paper": re.compile(_DRAWN),
     "flag": re.compile("|true|false"),
     "widths": re.compile(r"(?:m(?:ax|in)-width:\d{1,4}(?:\.\d+)?(?:px|rem);?)*"),
     "space": re.compile(r"http://www\.w3\.org/(?:1998/Math/MathML|2000/svg)"),
@@ -247,7 +242,7 @@ class Writer:
         drawn = unpacker.decompress(pixels, rows + 1)
         whole = content[:8] == b"\x89PNG\r\n\x1a\n" and kept[-1][4:8] == b"IEND" and not interlaced
         if not whole or len(drawn) != rows or unpacker.unused_data:
-            raise self._refusal(tag, "has a picture that is more, or less, than its pixels")
+            raise self._refusal(tag, "has a picture that is not its pixels alone")
         return b"".join(kept)
 
     def _refusal(self, tag: Tag, what: str) -> RunFailed:
@@ -257,8 +252,8 @@ class Writer:
             if one.name not in ("[document]", "html", "body")
         ]
         return RunFailed(
-            f"there is no copy, since an element of the report {what}, which is nothing that goes out",
-            "evaluate the flight again and share that; if it stays, tell the makers of wildlab",
+            f"there is no copy: an element of the report {what}",
+            "evaluate the flight again; if it stays, tell the makers of wildlab",
             file=self.file,
             field=" > ".join(above),
         )

@@ -5,15 +5,16 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 from pathlib import Path
 
 from bs4 import BeautifulSoup, Tag
 from bs4.element import NavigableString, PageElement
+from markupsafe import Markup
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import read_regular
-from wildlab.reporting.page import page
-from wildlab.reporting.text import escape
+from wildlab.reporting.text import page, render
 from wildlab.sharing.allow_list import Writer
 
 #: A report is a tenth of this.
@@ -30,7 +31,7 @@ class Part:
 
     number: int
     title: str
-    body: str
+    body: Markup
 
 
 @dataclass(frozen=True)
@@ -105,7 +106,7 @@ def read_part(report: Path, number: int, *, exact: bool, generalised: bool) -> P
     writer = Writer(
         report, number, frozenset(str(one["id"]) for one in main.find_all(id=True)), exact=not generalised
     )
-    return Part(number, heading.get_text(" ", strip=True), writer.inside(main).strip())
+    return Part(number, heading.get_text(" ", strip=True), Markup(writer.inside(main).strip()))  # noqa: S704 - written by the allow-list
 
 
 def _stays(paragraph: Tag, exact: bool) -> bool:
@@ -171,46 +172,11 @@ def join_chapters(chapters: Sequence[Chapter], heading: str) -> str:
     str
     """
     several = len(chapters) > 1
-    body = [f"<header><h1>{escape(heading)}</h1></header>"] if several else []
-    contents = ""
-    if sum(len(chapter.parts) for chapter in chapters) > 1:
-        contents = f'<nav aria-label="Reports"><h2>In this file</h2>{_listed(chapters)}</nav>'
-    body.append(contents if several else "")
-    level = "h2" if several else "h1"
-    for chapter in chapters:
-        body.append(
-            f"<header><{level}>{escape(chapter.heading)}</{level}>"
-            f'<p class="sub">{escape(chapter.lead)}</p></header>'
-        )
-        body.append("" if several else contents)
-        body += [
-            f'<article class="shared" id="r{part.number}-top" '
-            f'aria-label="{escape(part.title)} ({part.number})">\n{part.body}\n</article>'
-            for part in chapter.parts
-        ]
-        told = "".join(f"<li>{escape(one)}</li>" for one in chapter.about)
-        if told:
-            body.append(f'<section class="shared"><h2>About this copy</h2><ul>{told}</ul></section>')
-    return page(
-        title=heading if several else chapters[0].heading,
-        body="\n".join(filter(None, body)),
-        style=_STYLE,
-    )
-
-
-def _listed(chapters: Sequence[Chapter]) -> str:
-    """Links to the reports, under the chapters' headings where there are several: titles alone may be the
-    same."""
-    lists, before = [], 0
-    for chapter in chapters:
-        items = "".join(
-            f'<li><a href="#r{part.number}-top">{escape(part.title)}</a></li>' for part in chapter.parts
-        )
-        heading = f"<h3>{escape(chapter.heading)}</h3>" if len(chapters) > 1 else ""
-        # Counted through all chapters: a report is also told from one of the same title by its number.
-        lists.append(f'{heading}<ol start="{before + 1}">{items}</ol>' if items else "")
-        before += len(chapter.parts)
-    return "".join(lists)
+    # Counted through all chapters: a report is also told from one of the same title by its number.
+    starts = [0, *accumulate(len(chapter.parts) for chapter in chapters)]
+    numbered = list(zip(chapters, starts, strict=False))
+    body = render("copy", chapters=numbered, heading=heading, count=starts[-1])
+    return page(title=heading if several else chapters[0].heading, body=body, style=_STYLE)
 
 
 _STYLE = """.shared { border-top: 3px solid var(--line); margin-top: 3rem; padding-top: 1.5rem }

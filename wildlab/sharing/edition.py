@@ -28,9 +28,9 @@ from wildlab.messages.catalogue import (
     say,
 )
 from wildlab.messages.quantities import nice_length
-from wildlab.reporting.page import POLICY
-from wildlab.reporting.text import escape, mark_up, read_style, render
+from wildlab.reporting.text import POLICY, mark_up, read_style, render
 from wildlab.sharing.edition_story import Facts, tell
+from wildlab.sharing.tiers import Cell
 
 Array = NDArray[np.float64]
 
@@ -105,49 +105,34 @@ def picture_html(picture: MapPicture | None, language: Language) -> str:
     """A ``<figure>`` with the map and its caption, or nothing where there is nothing to draw."""
     if picture is None or len(_known_points(picture.path)) + len(_known_points(picture.seen)) < 2:
         return ""
-    seen, truth = _known_points(picture.seen), _known_points(picture.truth)
-    path = np.asarray(picture.path, float).reshape(-1, 2)
+    seen, begin = _known_points(picture.seen), _known_points(picture.path)[:1]
     # No point that is kilometres off, of whatever it is, shrinks the rest; nor does one who walked elsewhere.
-    near = np.concatenate([_usual(one) for one in (_known_points(path), seen) if len(one)])
+    near = np.concatenate([_usual(one) for one in (_known_points(picture.path), seen) if len(one)])
     low, high = near.min(axis=0), near.max(axis=0)
     size = np.maximum(high - low, 5.0)
-    room = np.array([HEIGHT - FOOT - 2 * MARGIN, WIDTH - 2 * MARGIN])
-    scale = float((room / size).min())
-    middle = (low + high) / 2
+    scale = float((np.array([HEIGHT - FOOT - 2 * MARGIN, WIDTH - 2 * MARGIN]) / size).min())
 
     def place(points: Array) -> Array:
-        offset = (points - middle) * scale
+        offset = (np.asarray(points, float).reshape(-1, 2) - (low + high) / 2) * scale
         return np.stack([WIDTH / 2 + offset[:, 1], (HEIGHT - FOOT) / 2 - offset[:, 0]], axis=1)
 
-    drawn = [f'<rect class="ground" width="{WIDTH:g}" height="{HEIGHT - FOOT:g}" rx="10"/>']
-    # An inner picture cuts off what is outside of it.
-    way = f'<path class="way" d="{_line(place(path))}"/>'
-    drawn.append(f'<svg width="{WIDTH:g}" height="{HEIGHT - FOOT:g}">{way}</svg>')
-    true = _dots(place(truth), "true", 3.0)
-    drawn += [_dots(place(seen), "seen", 4.2), true]
-    begin = _known_points(path)
-    if len(begin):
-        x, y = place(begin[:1])[0]
-        drawn.append(f'<circle class="start" cx="{x:.1f}" cy="{y:.1f}" r="5.5"/>')
-    drawn.append(_north())
-    drawn.append(_bar(scale, language))
-    wide = length(float(size[1]))
-    alt = say(
-        language,
-        Message("picture.map_alt", {"way": wide, "seen": number(len(seen))})
-        if len(seen)
-        else Message("picture.map_alt_way", {"way": wide}),
-    )
+    dots = {"seen": (_dots(place(seen)), 4.2), "true": (_dots(place(_known_points(picture.truth))), 3.0)}
     keys = [("way", "path"), ("start", "start")] * bool(len(begin)) + [("seen", "seen")] * bool(len(seen))
-    keys += [("true", "truth")] * bool(true)
-    legend = "".join(
-        f'<li><i class="{name}"></i>{escape(say(language, Message(f"picture.{key}")))}</li>'
-        for name, key in keys
-    )
-    caption = f'<ul class="legend">{legend}</ul>{escape(say(language, Message("picture.map")))}'
-    return (
-        f'<figure><svg viewBox="0 0 {WIDTH:g} {HEIGHT:g}" role="img" aria-label="{escape(alt)}">'
-        f"<title>{escape(alt)}</title>{''.join(drawn)}</svg><figcaption>{caption}</figcaption></figure>"
+    keys += [("true", "truth")] * bool(len(dots["true"][0]))
+    values: dict[str, Value] = {"way": length(float(size[1]))}
+    if len(seen):
+        values["seen"] = number(len(seen))
+    bar = nice_length(0.42 * WIDTH / scale)
+    return render(
+        "edition-map",
+        size=(WIDTH, HEIGHT, HEIGHT - FOOT),
+        alt=say(language, Message("picture.map_alt" if len(seen) else "picture.map_alt_way", values)),
+        way=_line(place(picture.path)),
+        dots=dots,
+        start=place(begin),
+        bar=(MARGIN, HEIGHT - 24.0, bar * scale, say(language, length(bar))),
+        legend=[(name, say(language, Message(f"picture.{key}"))) for name, key in keys],
+        caption=say(language, Message("picture.map")),
     )
 
 
@@ -162,11 +147,9 @@ def _usual(points: Array) -> Array:
 def _line(points: Array) -> str:
     parts, pen = [], "M"
     for x, y in _thinned(points, MOST_POINTS):
-        if not (math.isfinite(x) and math.isfinite(y)):
-            pen = "M"
-            continue
-        parts.append(f"{pen}{x:.1f} {y:.1f}")
-        pen = "L"
+        known = math.isfinite(x) and math.isfinite(y)
+        parts.append(f"{pen}{x:.1f} {y:.1f}" if known else "")
+        pen = "L" if known else "M"
     return "".join(parts)
 
 
@@ -174,53 +157,21 @@ def _thinned(points: Array, most: int) -> Array:
     return points[:: max(1, -(-len(points) // most))]
 
 
-def _dots(points: Array, name: str, radius: float) -> str:
-    inside = points[((points > 4) & (points < [WIDTH - 4, HEIGHT - FOOT - 4])).all(axis=1)]
-    return "".join(
-        f'<circle class="{name}" cx="{x:.1f}" cy="{y:.1f}" r="{radius:g}"/>'
-        for x, y in _thinned(inside, MOST_DOTS)
-    )
-
-
-def _north() -> str:
-    x = WIDTH - 24
-    return f'<path class="north" d="M{x:g} 14l8 24l-8 -6l-8 6z"/><text class="mid" x="{x:g}" y="55">N</text>'
-
-
-def _bar(scale: float, language: Language) -> str:
-    """A bar of a round length; ``scale`` is drawn units for a metre."""
-    metres = nice_length(0.42 * WIDTH / scale)
-    x, y, wide = MARGIN, HEIGHT - 24.0, metres * scale
-    return (
-        f'<path class="scale" d="M{x:g} {y - 6:g}v12M{x:g} {y:g}h{wide:.1f}M{x + wide:.1f} {y - 6:g}v12"/>'
-        f'<text x="{x + wide + 10:.1f}" y="{y + 5:g}">{escape(say(language, length(metres)))}</text>'
-    )
+def _dots(points: Array) -> Array:
+    """Points inside of the picture, no more than can be told apart."""
+    inside = ((points > 4) & (points < [WIDTH - 4, HEIGHT - FOOT - 4])).all(axis=1)
+    return _thinned(points[inside], MOST_DOTS)
 
 
 #: Signs of the verdicts, so that their colour is not all that tells them: a tick, a mark, a cross, a dash.
 SIGNS = {"good": "✓", "warn": "!", "bad": "✕", "neutral": "–"}
 
 
-class Place(NamedTuple):
-    """What is told of a place: that it is withheld, or a generalised one.
-
-    Attributes
-    ----------
-    uncertainty_m
-        How far off it may be shown, m.
-    middle_deg
-        Latitude and longitude of the point that is told; None where it is withheld.
-    """
-
-    uncertainty_m: float = 0.0
-    middle_deg: tuple[float, float] | None = None
-
-
 def edition_html(
     facts: Facts,
     *,
     name: str,
-    place: Place,
+    place: Cell | None,
     day: Day | None = None,
     picture: MapPicture | None = None,
     language: str | Path | Language = "en",
@@ -234,7 +185,7 @@ def edition_html(
     name
         What the flight is called on the page.
     place
-        How exactly places are shown.
+        The cell that is told; None where it is withheld.
     day
         When it was flown; None where that is not to be said.
     picture
@@ -293,14 +244,13 @@ def edition_html(
     )
 
 
-def _place(place: Place, words: Language) -> Message:
-    if place.middle_deg is None:
+def _place(cell: Cell | None, words: Language) -> Message:
+    if cell is None:
         return Message("place.withheld")
-    latitude, longitude = place.middle_deg
     values: dict[str, Value] = {
-        "latitude": _side(latitude, "north", "south", words),
-        "longitude": _side(longitude, "east", "west", words),
-        "uncertainty": length(place.uncertainty_m),
+        "latitude": _side(cell.latitude_deg, "north", "south", words),
+        "longitude": _side(cell.longitude_deg, "east", "west", words),
+        "uncertainty": length(cell.uncertainty_m),
     }
     return Message("place.generalised", values)
 

@@ -7,14 +7,16 @@ import statistics
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from wildlab.analysis.overview import ALARMS, TROUBLES
+from wildlab.analysis.overview import ALARMS, TROUBLES, Alarm
 from wildlab.analysis.verdict import (
     MOST,
+    PARTS,
     WORTH,
+    Gain,
     Verdict,
     causes_told,
     doubted,
-    error_left,
+    metric_gains,
     possible_gain,
 )
 from wildlab.messages.catalogue import Message, Quantity, Value, duration, length, number, share
@@ -23,8 +25,6 @@ from wildlab.reporting.own_flights import OwnFlight
 from wildlab.reporting.tracking import NEAR_THE_BAND, band_name
 
 NAN = math.nan
-#: Reports that tell how good something was, beside the overview.
-PARTS = ("georeferencing", "tracking", "navigation")
 #: What moves so far, and so far above the ground, flies: no mast of a boat or a car is as high, m.
 FLYING = 30.0
 _TROUBLES = dict(
@@ -36,24 +36,6 @@ _TROUBLES = dict(
 )
 
 
-class Alarm(NamedTuple):
-    """Something very wrong: a key of `ALARMS`, the worst of it (m, degrees or m/s^2), and how often."""
-
-    what: str
-    size: float
-    often: int
-
-
-class Gain(NamedTuple):
-    """One thing to fix, as `wildlab.analysis.verdict.Gain`: ``value`` of ``of``."""
-
-    key: str
-    causes: tuple[str, ...]
-    value: float
-    of: float
-    share: float
-
-
 class Facts(NamedTuple):
     """All that the page follows from. Numbers that are not known are NaN.
 
@@ -62,7 +44,7 @@ class Facts(NamedTuple):
     twin
         Whether nobody flew it.
     verdict
-        A key of `wildlab.analysis.verdict.Verdict`; None where the flight was not looked over.
+        A `wildlab.analysis.verdict.Verdict`; None where the flight was not looked over.
     problems
         Things in its records that cannot be used or contradict each other.
     length_s, height_m, area_m2
@@ -153,15 +135,11 @@ def facts_of(flight: OwnFlight) -> Facts:
         entry = flight.number(name, subject)
         return int(entry["n"]) if entry is not None and entry["n"] is not None else 0
 
-    alarms = tuple(Alarm(what, value("alarm", what), count("alarm", what)) for what in ALARMS)
+    alarms = (Alarm(what, count("alarm", what), NAN, value("alarm", what), NAN) for what in ALARMS)
     troubles = {_TROUBLES[s]: v for (name, s) in numbers if name == "trouble" and s in _TROUBLES
                 for v in [value(name, s)]}  # fmt: skip
     tracks = _leading_tracks(flight)
     possible = possible_gain({key: entry for key, entry in numbers.items() if entry["value"] is not None})
-    uncertain = None
-    if possible is not None:
-        share = possible.value / possible.of if possible.of > 0 else 0.0
-        uncertain = Gain("possible", causes_told(numbers), possible.value, possible.of, share)
     failed = tuple(one.about for one in flight.reports if one.state != "done")
     return Facts(
         twin=flight.kind == "twin",
@@ -186,7 +164,7 @@ def facts_of(flight: OwnFlight) -> Facts:
         alarms=tuple(one for one in alarms if math.isfinite(one.size)),
         troubles=tuple(sorted(troubles.items(), key=lambda one: -one[1])),
         gains=_gains(flight),
-        possible=uncertain,
+        possible=None if possible is None else possible._replace(causes=causes_told(numbers)),
         failed=tuple(about for about in ("overview", *PARTS) if about in failed),
         doubted=doubted(numbers),
         flown=value("height_above_ground") >= FLYING and value("path_length") >= FLYING,
@@ -196,22 +174,15 @@ def facts_of(flight: OwnFlight) -> Facts:
 def _gains(flight: OwnFlight) -> tuple[Gain, ...]:
     """What the overview ranked, with the metres or counts behind each."""
     overview = flight.report("overview")
-    found: list[Gain] = []
     if overview is None:
         return ()
+    metres = {gain.key: gain for gain in metric_gains(flight.numbers)}
+    found = []
     for (name, key), entry in overview.numbers.items():
-        if name != "gain_share" or entry["value"] is None:
-            continue
-        if key in ("cause", "far_out"):
-            gained = flight.value("gain", "winner" if key == "cause" else "without-far-out")
-            far_out = flight.value("horizontal_error_mean", "without-far-out")
-            left = error_left(flight.numbers) if key == "cause" else far_out
-            value, of = (NAN, NAN) if gained is None or left is None else (gained, gained + left)
-        else:
-            lost = overview.numbers.get(("lost", key))
-            value, of = (NAN, NAN) if lost is None else (float(lost["value"]), float(lost["n"]))
-        causes = causes_told(flight.numbers) if key == "cause" else ()
-        found.append(Gain(key, causes, value, of, float(entry["value"])))
+        if name == "gain_share" and entry["value"] is not None:
+            lost = overview.numbers.get(("lost", key), {"value": NAN, "n": NAN})
+            gain = metres.get(key, Gain(key, (), float(lost["value"]), float(lost["n"]), 0.0))
+            found.append(gain._replace(share=float(entry["value"]), why=""))
     return tuple(sorted(found, key=lambda one: -one.share))
 
 
@@ -242,18 +213,6 @@ def _median(values: Iterable[float]) -> float:
 STEP_M, MOST_STEPS = 0.75, 200
 #: Of two normal errors of equal spread, the median distance from the middle over that spread.
 MEDIAN_DISTANCE = math.sqrt(2 * math.log(2))
-#: The verdicts by their texts.
-VERDICTS: dict[str | None, str] = {
-    Verdict.ALARM: "went_wrong",
-    Verdict.MEND: "mend",
-    Verdict.FIX: "fix",
-    Verdict.LOOK: "look",
-    Verdict.SOUND: "sound",
-    Verdict.UNJUDGED: "unjudged",
-    None: "unjudged",
-}
-
-
 #: Troubles by the gain that is had by doing the same.
 _SAME_REMEDY = {
     "poses": "time_without_poses",
@@ -303,10 +262,9 @@ def tell(facts: Facts) -> Story:
     """
     if not (math.isfinite(facts.error_median) and math.isfinite(facts.error_p90)):
         facts = facts._replace(compared=0)
-    key = VERDICTS[facts.verdict]
     advice = _advice(facts)
     return Story(
-        Message(f"verdict.{key}"),
+        Message(f"verdict.{_key(facts)}"),
         _why(facts),
         _next(facts, advice),
         facts.verdict in (Verdict.FIX, Verdict.SOUND),
@@ -316,6 +274,11 @@ def tell(facts: Facts) -> Story:
         _cut(advice),
         _cut(_unknown(facts)),
     )
+
+
+def _key(facts: Facts) -> str:
+    """The verdict by its texts."""
+    return Verdict(facts.verdict or Verdict.UNJUDGED).name.lower()
 
 
 def _cut(items: Sequence[Message]) -> tuple[Message, ...]:
@@ -383,7 +346,7 @@ def _why(facts: Facts) -> Message:
 
 def _next(facts: Facts, advice: Sequence[Message]) -> Message:
     if facts.verdict in (Verdict.ALARM, Verdict.MEND, Verdict.LOOK):
-        return Message(f"next.{VERDICTS[facts.verdict]}")
+        return Message(f"next.{_key(facts)}")
     if facts.verdict == Verdict.FIX and facts.gains:
         # The thing itself: the list stands far below.
         return _do(facts.gains[0])

@@ -9,6 +9,7 @@ flight is what would be computed from the true one, to rounding errors, but for 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from typing import Any
@@ -36,7 +37,6 @@ from wildlab.sharing.names import (
     scale_pixels,
     whole_quarters,
 )
-from wildlab.sharing.sender_list import Removal, list_removals
 from wildlab.sharing.tiers import Cell, Treatment, cell_of
 
 _FORCE = ["f_x_m_s2", "f_y_m_s2", "f_z_m_s2"]
@@ -178,7 +178,7 @@ class Generalised:
     names
         Neutral names by the true ones.
     removed
-        For the sender only.
+        Lines for the sender only.
     clocks
         By the true name of a sensor, what was added to its stamps so that its offset tells no zone, s.
     pixels
@@ -189,7 +189,7 @@ class Generalised:
     cell: Cell | None
     when: str
     names: Names
-    removed: tuple[Removal, ...]
+    removed: tuple[str, ...]
     clocks: dict[str, float] = field(default_factory=dict)
     pixels: float = 1.0
 
@@ -268,9 +268,7 @@ def generalise(flight: Flight, treatment: Treatment, name: str = "flight") -> Ge
             east=terrain.east - shift[1],
         )
     made = Flight(make_manifest(data), nav, tables, None, terrain)
-    at = "withheld" if cell is None else f"{cell.latitude_deg:g}, {cell.longitude_deg:g}, a cell's middle"
-    removed = tuple(list_removals(true, made, names, start, when, at))
-    return Generalised(made, cell, when, names, removed, zones, pixels)
+    return Generalised(made, cell, when, names, tuple(list_removals(true, made, names)), zones, pixels)
 
 
 def _of_one_zone(flight: Flight) -> tuple[Flight, dict[str, float]]:
@@ -288,9 +286,8 @@ def _of_one_zone(flight: Flight) -> tuple[Flight, dict[str, float]]:
         zones = {moved.get(str(name), 0.0) for name in sources} or {0.0}
         if len(zones) > 1:
             raise WildlabError(
-                f"clocks of sensors are {max(zones) - min(zones):g} s apart, which tells zones of time, and "
-                "no frame says which sensor looked",
-                "name the sensor of every frame, in the column sensor of frames",
+                f"clocks of sensors are {max(zones) - min(zones):g} s apart, which tells zones of time",
+                "name the sensor of every frame in the column sensor of frames",
                 file=flight.folder,
                 field="frames.sensor",
             )
@@ -479,3 +476,53 @@ def _sensor(part: SensorPart, pixels: float) -> dict[str, Any]:
 def _field_part(iron: tuple[float, ...] | None, there: bool) -> dict[str, Any]:
     field = {"declination_deg": USUAL_DECLINATION_DEG, "inclination_deg": USUAL_INCLINATION_DEG}
     return (field if there else {}) | ({"hard_iron_ut": iron} if iron is not None else {})
+
+
+def list_removals(flight: Flight, made: Flight, names: Names) -> list[str]:
+    """What is gone of the manifest and the tables: what it was, and what stands in its place.
+
+    Parameters
+    ----------
+    flight, made
+        The true one and its generalised copy.
+    names
+        Neutral names by the true ones.
+    """
+    true = flight.manifest.model_dump(mode="json", exclude_none=True)
+    true["sensors"] = {names.of("sensor", name): part for name, part in true.get("sensors", {}).items()}
+    stated = dict(_leaves(made.manifest.model_dump(mode="json", exclude_none=True)))
+    lines = [
+        f"{field}: {value!r} -> {'left out' if stated.get(field, '') == '' else stated[field]}"
+        for field, value in _leaves(true)
+        if value != "" and stated.get(field) != value
+    ]
+    lines += [f"table {key}: left out" for key in sorted({*flight.tables} - {*made.tables})]
+    tables = {**{f"nav/{name}": nav for name, nav in flight.nav.items()}, **flight.tables}
+    for name, table in tables.items():
+        copied = _copied(made, name, flight)
+        gone = [] if copied is None else [one for one in table if one not in copied]
+        lines += [f"column {name}.{one}: left out" for one in gone]
+    lines += [] if flight.folder is None else [f"folder: {str(flight.folder.resolve())!r} -> left out"]
+    return [*lines, *_renames(names)]
+
+
+def _leaves(value: Any, place: str = "") -> Iterator[tuple[str, Any]]:
+    """Whatever is stated, with where."""
+    if isinstance(value, Mapping | list):
+        for key, one in value.items() if isinstance(value, Mapping) else enumerate(value):
+            yield from _leaves(one, f"{place}.{key}" if place else str(key))
+    else:
+        yield place, value
+
+
+def _copied(made: Flight, name: str, flight: Flight) -> pd.DataFrame | None:
+    if not name.startswith("nav/"):
+        return made.tables.get(name)
+    return list(made.nav.values())[list(flight.nav).index(name.removeprefix("nav/"))]
+
+
+def _renames(names: Names) -> Iterator[str]:
+    for kind, known in sorted(names.by_kind.items()):
+        many = kind in ("frame", "detection")
+        for true, neutral in list(known.items())[: 1 if many else None]:
+            yield f"{kind}: {true!r} -> {neutral}" + (f", and {len(known) - 1} more" if many else "")

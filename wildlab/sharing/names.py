@@ -201,7 +201,7 @@ def neutral_settings(
                 raise WildlabError(
                     f"the settings add {part.clock_offset_s:g} s to the stamps of {name!r}{here}, which "
                     "tells a zone of time",
-                    "state this offset in flight.toml, follow the targets again, and share that",
+                    "state this offset in flight.toml and follow the targets again",
                     field=f"sensors.{name}.clock_offset_s",
                 )
         sensors[names.of("sensor", name)] = data

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from bs4 import BeautifulSoup
 from rich.console import Console
 
 from wildlab.errors import RunFailed, WildlabError
@@ -15,18 +17,47 @@ from wildlab.flight.files import dump_toml
 from wildlab.flight.manifest import parse_settings
 from wildlab.flight.store import CALIBRATION, Flight, save_flight
 from wildlab.paths import NOTEBOOKS
+from wildlab.reporting.metrics import AGAINST
 from wildlab.reporting.own_flights import OwnFlight
 from wildlab.runner.evaluate import evaluate_flight
 from wildlab.runner.processes.scheduling import Outcome
-from wildlab.runner.record.own_flights import ABOUT, own_flights
+from wildlab.runner.record.own_flights import ABOUT, finished_metrics, own_flights
 from wildlab.runner.track import track_many
 from wildlab.sharing.generalisation import Generalised, neutral_learnt
-from wildlab.sharing.names import neutral_settings
+from wildlab.sharing.names import Names, neutral_settings
 from wildlab.sharing.reports import ENDS, MANY, Source
-from wildlab.sharing.sender_list import Agreement, compare
+from wildlab.sharing.tiers import describe
 
 #: What `wildlab evaluate` does not set of these, `wildlab track` was told.
 _TOLD = ("filters", "targets", "sensors", "settings", "tuned", "smooth")
+
+
+#: Numbers that differ by no more than this share are the same.
+SAME = 1e-3
+#: Nor do these, whatever they are a share of: beyond what any report prints.
+NOTHING = 1e-6
+
+
+class Agreement(NamedTuple):
+    """How many numbers both have, how many are the same, and the one that differs most.
+
+    Attributes
+    ----------
+    compared, same
+        Numbers.
+    worst
+        Greatest difference as a share of the greater number; 0 without any.
+    which
+        The number that has it, for the sender; "" without any.
+    otherwise
+        Sentences: where a report of the copy says something else than the sender's.
+    """
+
+    compared: int
+    same: int
+    worst: float
+    which: str
+    otherwise: tuple[str, ...] = ()
 
 
 class RecomputedReports(NamedTuple):
@@ -117,7 +148,7 @@ def recompute_reports(
             why = outcome.reason.rstrip(".")
             raise RunFailed(
                 f"the report {outcome.name} could not be made from generalised data ({why})",
-                "check the flight: wildlab check; then evaluate it and share it again",
+                "check and evaluate the flight, then share it again",
                 file=flight.folder,
             )
     wanted = [end for end in ENDS if end != MANY or several]
@@ -130,9 +161,9 @@ def recompute_reports(
         mine[f"{source.name}{end}"]: there for end, there in folders.items() if f"{source.name}{end}" in mine
     }
     lost = [one for one in mine if mine[one] not in pairs]
-    notes = told["notes"] + [f"There is no counterpart of your report {one} in the copy." for one in lost]
+    notes = told["notes"] + [describe("note-lost", report=one) for one in lost]
     missing = tuple(ABOUT[end] for end in wanted if end not in ends)
-    notes += [f"There is no report on {one} in the copy, as there is none here." for one in missing]
+    notes += [describe("note-missing", what=one) for one in missing]
     (own,) = own_flights(reports, ())
     numbered = [one for one in pairs if one.name == f"{source.name}{MANY}"]
     agreement = compare(pairs, made.names, numbered)
@@ -158,11 +189,8 @@ def _many(
             told, left_out = neutral_settings(parse_settings(text), made.names, made.clocks, made.pixels)
             file = work / "settings.toml"
             write_atomic(file, dump_toml(told.model_dump(exclude_none=True)))
-            notes = [
-                f"The settings of your report {source.name}{MANY} speak of {one!r}, which the flight does "
-                "not have: those of the copy do not."
-                for one in left_out
-            ]
+            report = f"{source.name}{MANY}"
+            notes = [describe("note-settings", report=report, name=repr(one)) for one in left_out]
         sensors = given.get("sensors") or ()
         poses = given.get("source")
         outcome = track_many(
@@ -195,13 +223,126 @@ def _told(source: Source, made: Generalised) -> dict[str, Any]:
         parameters = source.parameters.get(f"{source.name}{end}", {})
         given = {**{key: value for key, value in parameters.items() if value}, **given}
         if end == "-tracking" and any(parameters.get(key) for key in _TOLD):
-            notes.append(
-                "The report on tracking was made by `wildlab track` with settings of its own; that in the "
-                "copy is the one that `wildlab evaluate` makes."
-            )
+            notes.append(describe("note-tracking"))
     poses, calibration = given.get("source"), given.get("calibration")
     return {
         "source": made.names.of("poses", str(poses)) if poses else None,
         "calibration": neutral_learnt(parse_learnt(str(calibration)), made) if calibration else None,
         "notes": notes,
     }
+
+
+def compare(pairs: Mapping[Path, Path], names: Names, numbered: Collection[Path] = ()) -> Agreement:
+    """Numbers of the sender's reports against those of the copy's.
+
+    Parameters
+    ----------
+    pairs
+        Folders: of the copy's report by the sender's.
+    names
+        Neutral names by the true ones, which subjects may hold.
+    numbered
+        Those of the sender's reports whose subjects are no names: a target that is the first there is the
+        first in the copy, whatever it is called.
+
+    Returns
+    -------
+    Agreement
+    """
+    compared = same = 0
+    worst, which = 0.0, ""
+    otherwise: list[str] = []
+    for mine, theirs in pairs.items():
+        here, there = _numbers(mine), _numbers(theirs)
+        otherwise += _otherwise(_said(mine, here), _said(theirs, there))
+        for (name, subject), value in here.items():
+            other = there.get((name, subject if mine in numbered else _neutral(subject, names)))
+            if other is None:
+                continue
+            compared += 1
+            difference = share_apart(value, other)
+            same += difference <= SAME
+            if difference > worst:
+                worst, which = (
+                    difference,
+                    f"{mine.name}: {name} of {subject} is {value:.6g}, in the copy {other:.6g}",
+                )
+    return Agreement(compared, same, worst, which, tuple(otherwise))
+
+
+class _Answer(NamedTuple):
+    """What a report asks, what it answers in a word, and what it held its flight against."""
+
+    title: str
+    verdict: str
+    against: tuple[str, ...]
+
+
+def _said(report: Path, numbers: Mapping[tuple[str, str], float]) -> _Answer:
+    text = (report / "report.html").read_text(encoding="utf-8")
+    # What is asked and answered stands before the figures, which are most of a page.
+    for piece in (text.partition("<figure")[0], text):
+        soup = BeautifulSoup(piece, "html.parser")
+        title, word = soup.h1, soup.select_one("p.verdict .pill")
+        if title is not None and word is not None:
+            break
+    against = tuple(subject for name, subject in numbers if name == AGAINST)
+    return _Answer(
+        "" if title is None else title.get_text(" ", strip=True),
+        "" if word is None else word.get_text(" ", strip=True),
+        against,
+    )
+
+
+def _otherwise(mine: _Answer, theirs: _Answer) -> list[str]:
+    """Where a copy says something else than the report that it was made from."""
+    about, found = theirs.title.rstrip("?. ") or "a report", []
+    if mine.title != theirs.title:
+        found.append(describe("other-title", one=mine.title, other=theirs.title))
+    if mine.verdict != theirs.verdict:
+        one, other = mine.verdict or "nothing", theirs.verdict or "nothing"
+        found.append(describe("other-answer", about=about, one=one, other=other))
+    # A report of before it was recorded does not say.
+    if mine.against and mine.against != theirs.against:
+        one, other = (" and ".join(report.against) or "nothing" for report in (mine, theirs))
+        found.append(describe("other-reference", about=about, one=one, other=other))
+    return found
+
+
+def share_apart(one: float, other: float) -> float:
+    """How far two numbers are apart as a share of the greater one.
+
+    Examples
+    --------
+    >>> share_apart(2.0, 1.0), share_apart(0.0, 1e-9)
+    (0.5, 0.0)
+    """
+    if math.isnan(one) and math.isnan(other):
+        return 0.0
+    apart = abs(one - other)
+    if math.isnan(apart):
+        return 1.0
+    return 0.0 if apart <= NOTHING else apart / max(abs(one), abs(other))
+
+
+def _neutral(subject: str, names: Names) -> str:
+    """A subject as the copy calls it: whole, or part by part."""
+    known = {true: neutral for kind in names.by_kind.values() for true, neutral in kind.items()}
+    return known.get(subject) or "/".join(known.get(part, part) for part in subject.split("/"))
+
+
+def _numbers(report: Path) -> dict[tuple[str, str], float]:
+    metrics: dict[str, Any] = finished_metrics(report) or {}
+    return {
+        (str(one["name"]), str(one["subject"])): math.nan if one["value"] is None else float(one["value"])
+        for one in metrics.get("metrics", [])
+    }
+
+
+def describe_agreement(found: Agreement) -> str:
+    """For the page: what it says of its own numbers; nothing where nothing was compared."""
+    if not found.compared:
+        return ""
+    key = "agrees" if found.same == found.compared else "differs"
+    worst = f"{found.worst:.1%}"
+    return describe(key, compared=found.compared, same=found.same, to=f"{SAME:.1%}", worst=worst)

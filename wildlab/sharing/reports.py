@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -83,26 +83,22 @@ def sources_of(
     """
     if (path / FILE_NAME).is_file():
         mine = provenance_of_flight(path)
-        made = _made(reports, mine["name"])
-        ours = [one for one in made if same_flight(read_provenance(one).get("flight") or {}, mine)]
+        ours = [
+            one
+            for one in _made(reports, mine["name"])
+            if same_flight(read_provenance(one).get("flight") or {}, mine)
+        ]
         if not ours:
-            other = "".join(
-                f"; {one.name} is of other tables, or was made before they were changed" for one in made
-            )
-            names = ", ".join(f"{mine['name']}{end}" for end in ENDS)
             raise WildlabError(
-                f"there is no report on this flight as it is in {reports.resolve()}, which was searched for "
-                f"{names}{other}",
-                f"name the report itself, or evaluate the flight here: {typed('wildlab evaluate', path)}",
+                f"there is no report on this flight as it is in {reports.resolve()}",
+                f"evaluate it: {typed('wildlab evaluate', path)}",
                 file=path,
             )
         path = ours[0]
     folder = path.parent if path.name == "report.html" else path
     if not folder.is_dir():
-        fix = "name the folder of a report, reports/NAME, or the folder of all of them"
-        # A flight without pixels has no report that is called as it is.
-        there = _made(folder.parent, folder.name)
-        raise WildlabError("there is no such report", _instead(there) if there else fix, file=path)
+        fix = "name the folder of a report, or of all of them"
+        raise WildlabError("there is no such report", fix, file=path)
     if (folder / "report.html").is_file():
         source, left_out = _with_siblings(_source(folder, studies), studies)
         return [source], left_out
@@ -123,21 +119,19 @@ def sources_of(
             left_out += more
     if not found:
         why = f" ({left_out[0]})" if left_out else ""
-        raise WildlabError(
-            f"no report here can be shared{why}", "name a folder with reports that are done", file=path
-        )
+        raise WildlabError(f"no report here can be shared{why}", "name a folder with others", file=path)
     return list(found.values()), list(dict.fromkeys(left_out))
 
 
 def _source(folder: Path, studies: dict[str, StudyEntry]) -> Source:
     status = read_status(folder)
     if status.get("state") == "damaged":
-        raise WildlabError(str(status["reason"]), "make the report again, then share it", file=folder)
+        raise WildlabError(str(status["reason"]), "make the report again", file=folder)
     if status.get("state") != "done":
-        raise WildlabError("this report is not done", "make it again, then share it", file=folder)
+        raise WildlabError("this report is not done", "make it again", file=folder)
     provenance = read_provenance(folder)
     if not provenance:
-        fix = "only reports of studies and of `wildlab evaluate` are shared: evaluate the flight, share that"
+        fix = "evaluate the flight, and share what that makes"
         raise WildlabError("nothing says what this report was made from", fix, file=folder)
     flight = provenance.get("flight")
     given = provenance.get("parameters")
@@ -149,11 +143,9 @@ def _source(folder: Path, studies: dict[str, StudyEntry]) -> Source:
         return Source(folder.name, (folder,), False, {}, parameters)
     name = str(flight.get("name", ""))
     if not _drawn_again(folder, name, provenance):
-        there = _made(folder.parent, name)
         raise WildlabError(
-            "this report on a flight is not one that `wildlab evaluate` or `wildlab track --many` makes, so "
-            "it cannot be drawn again from generalised data",
-            _instead(there) if there else "evaluate the flight (wildlab evaluate), and share what that makes",
+            "this report cannot be drawn again from generalised data",
+            "evaluate the flight, and share what that makes",
             file=folder,
         )
     return Source(name, (folder,), True, flight, parameters)
@@ -179,10 +171,6 @@ def _made(reports: Path, name: str) -> list[Path]:
     return [
         one for one in found if (one / "report.html").is_file() and read_status(one).get("state") == "done"
     ]
-
-
-def _instead(there: Sequence[Path]) -> str:
-    return f"share one that is there, and all on the flight go with it: {typed('wildlab share', there[0])}"
 
 
 def of_a_study(flight: dict[str, Any], reports: Path) -> bool:
@@ -234,7 +222,7 @@ def _with_siblings(source: Source, studies: dict[str, StudyEntry]) -> tuple[Sour
             folders.append(folder)
             parameters |= one.parameters
         else:
-            left_out.append(f"{folder}: this report was made from other tables than the flight's others.")
+            left_out.append(f"{folder}: it was made from other tables.")
     old = ", ".join(folder.name for folder in folders if not has_digests(read_status(folder)))
     left_out += [f"{old}: {BEFORE_DIGESTS}."] if old else []
     return Source(source.name, tuple(folders), True, source.flight, parameters), left_out
@@ -262,14 +250,11 @@ def flight_folder(source: Source, given: Path | None) -> Path:
     again = f"{typed('wildlab share', source.folders[0])} --flight FOLDER"
     if given is not None:
         if not (given / FILE_NAME).is_file():
-            raise WildlabError(
-                "there is no flight in this folder", "name the folder with its flight.toml", file=given
-            )
+            raise WildlabError("there is no flight in this folder", "name its folder", file=given)
         if not same_flight(provenance_of_flight(given), source.flight):
             raise WildlabError(
-                f"this is not the flight that the reports on {source.name} were made from, or it was changed "
-                "since",
-                f"evaluate it again, or name the right one: {again}",
+                f"this is not the flight that the reports on {source.name} were made from",
+                f"evaluate it again, or: {again}",
                 file=given,
                 field="--flight",
             )

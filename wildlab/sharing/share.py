@@ -1,43 +1,42 @@
-"""A copy of reports that is safe to send."""
+"""A copy of reports that is safe to send: one file, looked through in memory before it is written."""
 
 from __future__ import annotations
 
+import contextlib
+import io
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
+import pyzipper
 from rich.console import Console
 
 from wildlab.errors import RunFailed, WildlabError
 from wildlab.files import write_atomic
 from wildlab.flight.manifest import FILE_NAME
 from wildlab.flight.store import Flight, confirmed_locations, load_flight
-from wildlab.messages.catalogue import Day, Language, load_language
+from wildlab.messages.catalogue import Day, Language, load_language, load_texts
 from wildlab.paths import NOTEBOOKS, REPORTS
 from wildlab.runner.catalogue import load_studies
 from wildlab.sharing.allow_list import first_foreign_word
 from wildlab.sharing.document import Chapter, join_chapters, read_part
-from wildlab.sharing.edition import Place, edition_html, map_of
+from wildlab.sharing.edition import edition_html, map_of
 from wildlab.sharing.edition_story import facts_of
 from wildlab.sharing.generalisation import Generalised, generalise
-from wildlab.sharing.package import (
-    OPENED_WITH,
-    check_password,
-    private_folder,
-    put,
-    refuse_existing,
-    zip_bytes,
-)
-from wildlab.sharing.recomputation import RecomputedReports, recompute_reports
+from wildlab.sharing.recomputation import RecomputedReports, describe_agreement, recompute_reports
 from wildlab.sharing.reports import Source, flight_folder, sources_of
-from wildlab.sharing.scan import SecretSearch, search_limits
-from wildlab.sharing.secrets import Secrets, all_of, flight_secrets, machine_secrets
-from wildlab.sharing.sender_list import describe_agreement, removal_lines, sender_list
+from wildlab.sharing.scan import Secrets, SecretSearch, all_of, flight_secrets, machine_secrets, search_limits
 from wildlab.sharing.tiers import (
     Tier,
     Treatment,
     confirmed_treatment,
+    describe,
     describe_generalisation,
     describe_place,
     load_tiers,
@@ -45,10 +44,6 @@ from wildlab.sharing.tiers import (
 
 #: Of what the scan found, so many are named.
 _MOST = 5
-#: What is said of a copy whose flight is as it was.
-_EXACT = "For the team: places, dates and names are the true ones. Do not pass it on."
-#: Before all else, where a copy does not say what the reports it was made from say.
-BEWARE = "Beware: this copy does not say what the original says."
 _WORDS = {"public": "for the public", "partner": "for partners", "team": "for the team"}
 
 
@@ -147,9 +142,7 @@ def share(
         flight = report
     flights = [source for source in sources if source.logged]
     if flight is not None and len(flights) != 1:
-        raise WildlabError(
-            "a flight is named, and this is not one flight's report", "leave --flight out", field="--flight"
-        )
+        raise WildlabError("this is not one flight's report", "leave --flight out", field="--flight")
     exact = load_tiers().tier[tier].exact
     words = _language(edition, sources, exact)
     calls = _calls(sources, exact)
@@ -175,7 +168,7 @@ def share(
             documents.append(_copied(source, tier, name, first))
     pages = _pages(documents, target, zipped, len(flights))
     _refuse_leaks(pages, target, sought)
-    notes = [*left_out, *search_limits(secrets), *([] if password is None else [OPENED_WITH])]
+    notes = [*left_out, *search_limits(secrets), *([] if password is None else [describe("encrypted")])]
     lines = sender_list(
         target.name, [document.told for document in documents], notes, generalised=any(folders)
     )
@@ -246,12 +239,9 @@ def _generalised(
         ]
     when = f" Flown {'on' if treatment.date == 'day' else 'in'} {made.when}." if made.when else ""
     about = [
-        *(f"There is no report on {what}: it could not be made." for what in drawn.missing),
-        "Times count from the first sample, heights from the ground of the flight.",
-        "Names of the flight, of targets, files and sensors are replaced by neutral ones, focal lengths are "
-        "rounded, and photographs are left out.",
-        "Every figure and every number was computed again from generalised data. "
-        + describe_agreement(drawn.agreement),
+        *(describe("missing", what=what) for what in drawn.missing),
+        describe("about"),
+        describe_agreement(drawn.agreement),
         describe_generalisation(made.cell, treatment.category),
     ]
     heading = f"{'A flight' if name == 'flight' else name.replace('-', ' ').capitalize()}, {_WORDS[tier]}"
@@ -259,18 +249,20 @@ def _generalised(
     named = next(filter(None, map(first_foreign_word, otherwise)), "")
     if named:
         raise RunFailed(
-            f"there is no copy, since it differs from your reports, and cannot say how without {named!r}",
+            f"there is no copy: it differs from your reports in {named!r}, which it cannot say",
             "evaluate the flight again and share that",
             file=source.folders[0],
         )
     if words is not None and otherwise:
         raise RunFailed(
             f"the sheet would not say what your reports say: {' '.join(otherwise).rstrip('.')}",
-            "share the reports without --edition: they say at their top where they differ",
+            "share the reports without --edition",
             file=source.folders[0],
         )
-    lead = " ".join([*([BEWARE, *otherwise] if otherwise else []), describe_place(made.cell) + when])
-    chapter = Chapter(heading, lead, tuple(line.strip() for line in about), tuple(parts))
+    lead = " ".join(
+        [*([describe("beware"), *otherwise] if otherwise else []), describe_place(made.cell) + when]
+    )
+    chapter = Chapter(heading, lead, tuple(filter(None, about)), tuple(parts))
     sheet = "" if words is None else _sheet(drawn, name, treatment, words)
     return _Document(name, chapter, (f"Flight {source.name}", tuple(_told(drawn, treatment))), sheet)
 
@@ -278,13 +270,10 @@ def _generalised(
 def _sheet(drawn: RecomputedReports, name: str, treatment: Treatment, words: Language) -> str:
     """The flight on one sheet, from its generalised copy alone."""
     made = drawn.made
-    place = Place()
-    if made.cell is not None:
-        place = Place(made.cell.uncertainty_m, (made.cell.latitude_deg, made.cell.longitude_deg))
     epoch = made.flight.manifest.time.epoch
     day = None if epoch is None else Day(epoch.date(), treatment.date == "day")
     return edition_html(
-        facts_of(drawn.own), name=name, place=place, day=day, picture=map_of(made.flight), language=words
+        facts_of(drawn.own), name=name, place=made.cell, day=day, picture=map_of(made.flight), language=words
     )
 
 
@@ -294,28 +283,24 @@ def _language(edition: str | Path | None, sources: Sequence[Source], exact: bool
         return None
     if exact or len(sources) != 1 or not sources[0].logged:
         raise WildlabError(
-            "the sheet is of one flight, and for partners or the public",
-            "name one report on a flight, with --for partner or --for public",
+            "the sheet is of one flight, for partners or the public",
+            "name one report on a flight",
             field="--edition",
         )
     return load_language(edition)
 
 
 def _told(drawn: RecomputedReports, treatment: Treatment) -> Iterator[str]:
-    how = "as flight.toml states" if treatment.stated else "assumed: flight.toml states no category"
-    how = how if treatment.unconfirmed is None else "the more careful one"
-    yield f"category {treatment.category} of GBIF's guide ({how}), dates to the {treatment.date}"
-    if treatment.unconfirmed is not None:
-        yield (
-            f"flight.toml states category {treatment.unconfirmed}, and it was not confirmed: the more "
-            "careful one counts. If it is meant: wildlab check --accept"
-        )
-    yield from removal_lines(drawn.made.removed)
+    how = "stated" if treatment.stated else "assumed"
+    how = how if treatment.unconfirmed is None else "unconfirmed"
+    values = {"category": treatment.category, "date": treatment.date, "other": treatment.unconfirmed}
+    yield describe(f"category-{how}", **values)
+    yield from drawn.made.removed
     a = drawn.agreement
     if a.compared:
-        yield f"{a.same} of {a.compared} numbers are those of your report, to 0.1 % or better"
+        yield describe("same-numbers", same=a.same, compared=a.compared)
     if a.which:
-        yield f"the one that differs most ({a.worst:.2g} of it): {a.which}"
+        yield describe("worst-number", worst=f"{a.worst:.2g}", which=a.which)
     yield from a.otherwise
     yield from drawn.notes
 
@@ -327,12 +312,11 @@ def _copied(source: Source, tier: Tier, name: str, first: int) -> _Document:
         read_part(one / "report.html", number, exact=exact, generalised=False)
         for number, one in enumerate(source.folders, first)
     ]
-    about = (
-        _EXACT if source.logged else "Simulated, or computed from public data: it has no place to be hidden."
-    )
+    about = describe("team" if source.logged else "nobody")
     heading = f"{'Flight' if source.logged else 'Study'} {source.name}"
-    removed = "removed: links to files beside the report, and what this machine and its users are called"
-    return _Document(name, Chapter(f"{name}, {_WORDS[tier]}", about, (), tuple(parts)), (heading, (removed,)))
+    return _Document(
+        name, Chapter(f"{name}, {_WORDS[tier]}", about, (), tuple(parts)), (heading, (describe("removed"),))
+    )
 
 
 def _refuse_leaks(pages: Mapping[str, str], target: Path, sought: SecretSearch) -> None:
@@ -350,11 +334,150 @@ def _refuse_leaks(pages: Mapping[str, str], target: Path, sought: SecretSearch) 
     more = f"; and {len(found) - _MOST} more" if len(found) > _MOST else ""
     named = all(one.file.startswith("the name of the file") for one in found)
     raise RunFailed(
-        f"there is no copy, since this was found in it: {several}{more}",
+        f"there is no copy: this was found in it: {several}{more}",
         "give the copy another name: --out FILE"
         if named
-        else "rename what the flight calls so (flight.toml, its tables), evaluate it again, and share it "
-        "again; if it is a place or a date, keep the report to yourself and tell the makers of wildlab",
+        else "rename it in the flight, evaluate and share again; report a place or date",
         file=target,
         field="--out" if named else "",
     )
+
+
+def sender_list(
+    file: str, told: Sequence[tuple[str, Sequence[str]]], notes: Sequence[str], *, generalised: bool
+) -> list[str]:
+    """The whole list.
+
+    Parameters
+    ----------
+    file
+        Name of the copy.
+    told
+        Heading and lines for each flight and study.
+    notes
+        Sentences on the copy as a whole.
+    generalised
+        Whether there is a place to be hidden in it.
+
+    Returns
+    -------
+    list of str
+    """
+    lines = [describe("for-the-sender", file=file), ""]
+    for heading, ones in told:
+        lines += [heading, *(f"  {line}" for line in ones), ""]
+    if generalised:
+        texts = load_texts("sharing").answers
+        remains = [text for key, text in texts.items() if key.startswith("remains-")]
+        lines += [describe("cannot-hide"), *(f"  {line}" for line in remains), ""]
+    if notes:
+        lines += ["Also", *(f"  {line}" for line in notes), ""]
+    return lines[:-1]
+
+
+#: Of every file in a zip: no zip can be older, and this one says nothing of when it was made.
+_TIME = (1980, 1, 1, 0, 0, 0)
+#: A password is tried offline, as often as whoever has the file can pay for.
+SHORTEST = 12
+
+
+#: Waits until the process that started it is gone, however it ended, and removes a folder until it stays
+#: away: what that process had started may still write into it.
+_WATCH = """
+import os, shutil, sys, time
+sys.stdin.buffer.read()
+for _ in range(20):
+    if not os.path.lexists(sys.argv[1]):
+        break
+    shutil.rmtree(sys.argv[1], ignore_errors=True)
+    time.sleep(0.25)
+"""
+
+
+@contextlib.contextmanager
+def private_folder() -> Iterator[Path]:
+    """A folder among the system's temporary ones that nobody else may open; gone afterwards, however it ends.
+
+    A process of its own watches over it, so that nothing is left where this one is killed.
+    """
+    with tempfile.TemporaryDirectory(prefix="wildlab-share-") as folder:
+        command = [sys.executable, "-I", "-S", "-c", _WATCH, folder]
+        watch = subprocess.Popen(  # noqa: S603 - our own words
+            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            start_new_session=True, cwd=tempfile.gettempdir(),
+        )  # fmt: skip
+        try:
+            yield Path(folder)
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+            watch.communicate()
+
+
+def refuse_existing(target: Path, overwrite: bool) -> None:
+    """Nothing is overwritten without being asked; and what nothing can be written into is no place.
+
+    Raises
+    ------
+    WildlabError
+        Where there is something that may not be replaced, or no folder that can be written to.
+    """
+    folder = next(one for one in target.absolute().parents if os.path.lexists(one))
+    if not folder.is_dir() or not os.access(folder, os.W_OK | os.X_OK):
+        raise WildlabError("nothing can be written here", "use --out", file=folder)
+    if target.is_dir():
+        raise WildlabError("is a folder, and a copy is one file", "use --out", file=target)
+    if os.path.lexists(target) and not overwrite:
+        fix = "use --out or --overwrite"
+        raise WildlabError("this file is there already", fix, file=target)
+
+
+def check_password(password: str) -> None:
+    """Refuse a password that could be tried out.
+
+    Raises
+    ------
+    WildlabError
+        Where it is too short.
+    """
+    if len(password) < SHORTEST:
+        raise WildlabError(
+            f"the password has {len(password)} characters, which can all be tried",
+            f"take {SHORTEST} or more",
+        )
+
+
+def zip_bytes(files: Mapping[str, bytes], password: str | None = None) -> bytes:
+    """Files as a zip, which lies nowhere yet; the same files without a password give the same bytes.
+
+    Parameters
+    ----------
+    files
+        Content by name.
+    password
+        With it, what is inside is encrypted with AES-256; the names are not.
+    """
+    whole = io.BytesIO()
+    with pyzipper.AESZipFile(whole, "w", compression=pyzipper.ZIP_DEFLATED) as zipped:
+        if password is not None:
+            zipped.setpassword(password.encode("utf-8"))
+            # Version 2: the first one writes a checksum of what is inside where everybody can read it.
+            zipped.setencryption(pyzipper.WZ_AES, nbits=256, force_wz_aes_version=2)
+        for name, content in files.items():
+            info = pyzipper.zipfile_aes.AESZipInfo(name, date_time=_TIME)
+            info.compress_type = pyzipper.ZIP_DEFLATED
+            info.create_system, info.external_attr = 3, 0o644 << 16
+            zipped.writestr(info, content)
+    return whole.getvalue()
+
+
+def put(content: bytes, target: Path, overwrite: bool) -> None:
+    """Write a finished file, whole or not at all.
+
+    Raises
+    ------
+    WildlabError
+        Where something came into its place meanwhile.
+    """
+    refuse_existing(target, overwrite)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    write_atomic(target, content)

@@ -54,9 +54,9 @@ class Table(Strict):
     @model_validator(mode="after")
     def _whole(self) -> Table:
         if [row.number for row in self.category] != [1, 2, 3, 4]:
-            raise ValueError("the categories are not 1, 2, 3, 4; give each once, in that order")
+            raise ValueError("give the categories 1, 2, 3, 4 in that order")
         if set(self.unstated) != {"withheld", "generalised", "open"} or set(self.tier) != set(TIERS):
-            raise ValueError("a sensitivity or a tier has no row; give each one")
+            raise ValueError("give each sensitivity and tier a row")
         return self
 
 
@@ -163,9 +163,8 @@ def treatment_of(locations: LocationsPart, tier: Tier) -> Treatment:
     category = table.unstated[locations.sensitivity] if own is None else own
     if agreed is not None and agreed < category:
         raise WildlabError(
-            f"category {agreed} is agreed with partners, and the public is told by category {category}, "
-            "which is less careful",
-            "set agreed_category to the category or above it, or leave it out",
+            f"category {agreed}, agreed with partners, is more careful than the public's {category}",
+            "set agreed_category to the category or above",
             field="locations.agreed_category",
         )
     stated = own is not None
@@ -258,27 +257,30 @@ def round_up(metres: float) -> float:
     return round(math.ceil(metres / step - 1e-9) * step, _DIGITS)
 
 
+def describe(key: str, **values: object) -> str:
+    """A text of ``data/messages/en/sharing.toml`` with its values."""
+    return fill(load_texts("sharing").answers[key], {}, {name: str(value) for name, value in values.items()})
+
+
 def describe_place(cell: Cell | None) -> str:
     """Where it was, in words; without a cell, that it is not told."""
-    texts = load_texts("sharing").answers
     if cell is None:
-        return texts["withheld"]
-    values = {
-        "latitude": _side(cell.latitude_deg, "N", "S"),
-        "longitude": _side(cell.longitude_deg, "E", "W"),
-        "size": f"{cell.size_deg:g}",
-        "uncertainty": format_distance(cell.uncertainty_m),
-    }
-    return fill(texts["cell"], {}, values)
+        return describe("withheld")
+    return describe(
+        "cell",
+        latitude=_side(cell.latitude_deg, "N", "S"),
+        longitude=_side(cell.longitude_deg, "E", "W"),
+        size=f"{cell.size_deg:g}",
+        uncertainty=format_distance(cell.uncertainty_m),
+    )
 
 
 def describe_generalisation(cell: Cell | None, category: int) -> str:
     """The text for Darwin Core's ``dataGeneralizations`` (or ``informationWithheld``)."""
-    texts, values = load_texts("sharing").answers, {"category": str(category)}
     if cell is None:
-        return fill(texts["information-withheld"], {}, values)
-    values |= {"size": f"{cell.size_deg:g}", "metres": f"{cell.uncertainty_m:.0f}"}
-    return fill(texts["data-generalizations"], {}, values)
+        return describe("information-withheld", category=category)
+    size, metres = f"{cell.size_deg:g}", f"{cell.uncertainty_m:.0f}"
+    return describe("data-generalizations", category=category, size=size, metres=metres)
 
 
 def format_distance(metres: float) -> str:

@@ -33,8 +33,7 @@ from wildlab.flight.manifest import read_settings
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
 from wildlab.paths import DATA
-from wildlab.reporting.charts.drawing import draw_way, finish, mark_level
-from wildlab.reporting.charts.forms import fit_map, plain_numbers
+from wildlab.reporting.charts.drawing import draw_way, finish, fit_map, mark_level
 from wildlab.reporting.figures import (
     BLUE,
     GREEN,
@@ -44,6 +43,7 @@ from wildlab.reporting.figures import (
     colour,
     map_axes,
     new_figure,
+    plain_numbers,
 )
 from wildlab.reporting.report import Report
 from wildlab.studies.page import Shown
@@ -455,7 +455,7 @@ def mean_nees(tracks: pd.DataFrame, names: Mapping[str, str]) -> Figure:
     for name in ("kf", *FILTERS["position"][1:]):
         ax.plot([], [], "o", color=colour(name), ms=5, label=names[name])
     ax.plot([], [], "o", mec=GREY, mfc="white", ms=5, label="lost")
-    return finish(fig, "", ylabel="mean NEES of a track")
+    return finish(fig, ylabel="mean NEES of a track")
 
 
 def track_map(flight: Flight, followed: Sequence[SensorTrack], case: str, names: Mapping[str, str]) -> Figure:
@@ -477,4 +477,5 @@ def track_map(flight: Flight, followed: Sequence[SensorTrack], case: str, names:
         )
     fit_map(ax, np.concatenate(list(places.values())), MARGIN_M)
     map_axes(ax)
-    return finish(fig, case.replace("-", " ").capitalize())
+    ax.set_title(case.replace("-", " ").capitalize())
+    return finish(fig)

@@ -20,8 +20,7 @@ from wildlab.geometry.frames import Array, euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.intrinsics import PINHOLE, Views, calibrate_camera, parameters_of, project_board
 from wildlab.geometry.mount import Mount, camera_rotation, helgesen_misalignment
-from wildlab.reporting.charts.drawing import draw_dots, finish
-from wildlab.reporting.charts.forms import Values, rows_chart
+from wildlab.reporting.charts.drawing import Values, draw_dots, finish, rows_chart
 from wildlab.reporting.figures import BLUE, GREEN, INK, VERMILLION, new_figure
 from wildlab.reporting.published import error_name
 from wildlab.simulation.boards import board_image, board_views
@@ -379,7 +378,7 @@ def circle_grid(centres: Centres, calibrated: pd.DataFrame) -> Figure:
     axes[1].plot(TAU2.cx, TAU2.cy, "x", color=INK, ms=8, mew=2, label="truth")
     axes[1].set(ylabel="row (px)", title="Principal point")
     axes[1].set_aspect("equal", "datalim")
-    return finish(fig, "", "principal point, column (px)")
+    return finish(fig, "principal point, column (px)")
 
 
 def mounting_causes(causes: Sequence[Cause]) -> Figure:

@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from wildlab.evaluation.consistency import chi_square_interval, share_inside, simulate_filter_runs
 from wildlab.evaluation.intervals import Interval, share_interval
 from wildlab.evaluation.shares import FAILS, HOLDS, UNDECIDED
-from wildlab.reporting.charts.drawing import finish
-from wildlab.reporting.charts.forms import Values, draw_lines
+from wildlab.reporting.charts.drawing import Values, draw_lines, finish
 from wildlab.reporting.figures import colour, log_band, new_figure
 
 #: What share of a consistent filter's values lies within its 95 % limits.
@@ -124,4 +123,4 @@ def one_run(squares: Squares, subject: str, label: str, ylim: tuple[float, float
     draw_lines(ax, squares.times, lines)
     log_band(ax, *squares.limits[subject])
     ax.set_ylim(ylim)
-    return finish(fig, "", "time (s)", label)
+    return finish(fig, "time (s)", label)

@@ -28,8 +28,7 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.covariances import gate_threshold
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import georeference_pixels
-from wildlab.reporting.charts.drawing import draw_dots, draw_way, finish
-from wildlab.reporting.charts.forms import draw_picture, spread_points
+from wildlab.reporting.charts.drawing import draw_dots, draw_picture, draw_way, finish, spread_points
 from wildlab.reporting.figures import BLUE, INK, ORANGE, VERMILLION, map_axes, new_figure
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.twins import simulate_twin
@@ -613,7 +612,7 @@ def plot_tracks(flown: Flown, names: Mapping[str, str]) -> Figure:
         low, high = ax.get_ylim()
         ax.set_ylim(low - FREE * (high - low), high)
         map_axes(ax, scale_bar=ax is axes[-1], east="east (m)" if ax is axes[-1] else "")
-    return finish(fig, "")
+    return finish(fig)
 
 
 def plot_features(looks: list[Array]) -> Figure:

@@ -22,8 +22,7 @@ from wildlab.geometry.covariances import inside_ellipse
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.messages.quantities import percent_between
-from wildlab.reporting.charts.drawing import draw_dots, finish, name_rows
-from wildlab.reporting.charts.forms import draw_marks, draw_picture
+from wildlab.reporting.charts.drawing import draw_dots, draw_marks, draw_picture, finish, name_rows
 from wildlab.reporting.figures import BLUE, VERMILLION, new_figure
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.scene.flights import corner_of
@@ -329,7 +328,7 @@ def frame(pair: FlightPair) -> Figure:
     draw_picture(ax, counts, limits=None)
     marks = {"drawn": pair.drawn_uv[row], "found": pair.marks.uv[row], "centre": pair.marks.centre[row]}
     draw_marks(ax, {name: at - corner_of(window) for name, at in marks.items()})
-    return finish(fig, "")
+    return finish(fig)
 
 
 def track_errors(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
@@ -344,4 +343,4 @@ def track_errors(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
         draw_dots(ax, rendered, y, BLUE, "rendered", marker="o", alpha=1.0)
     name_rows(ax, [names[who] for who in filters])
     ax.set_xlim(left=0)
-    return finish(fig, "", "mean distance from the truth (m)")
+    return finish(fig, "mean distance from the truth (m)")

@@ -27,8 +27,7 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, euler_to_matrix, matrix_to_euler, quaternion_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel, pixel_to_plane
 from wildlab.geometry.mount import Mount
-from wildlab.reporting.charts.drawing import draw_dots, draw_way, finish
-from wildlab.reporting.charts.forms import Values, draw_lines
+from wildlab.reporting.charts.drawing import Values, draw_dots, draw_lines, draw_way, finish
 from wildlab.reporting.figures import (
     BLUE,
     GREEN,
@@ -390,7 +389,7 @@ def plot_rates(
     ax.errorbar(at[: len(FORMS)], printed, 2 * spread / np.sqrt(PUBLISHED_RUNS), **hollow, **look)
     ax.set_xticks(at, [fill(names[gate], 11) for gate in GATES])
     ax.set_xlim(-0.5, len(GATES) - 0.5)
-    return finish(fig, "", ylabel="right associations (%)")
+    return finish(fig, ylabel="right associations (%)")
 
 
 def plot_right_and_wrong(one: Gated, names: Mapping[str, str]) -> Figure:
@@ -402,7 +401,7 @@ def plot_right_and_wrong(one: Gated, names: Mapping[str, str]) -> Figure:
         ax.annotate(names[form], (1, 2 * row + 0.5), fontsize=10, va="center", color=_COLOURS[form])
     ax.set_yticks(range(2 * len(FORMS)), ["wrong", "right"] * len(FORMS))
     ax.set_ylim(-0.4, 5.5)
-    return finish(fig, "", "image")
+    return finish(fig, "image")
 
 
 def plot_nis(one: Gated, form: str) -> Figure:
@@ -414,7 +413,7 @@ def plot_nis(one: Gated, form: str) -> Figure:
     }
     draw_lines(ax, np.arange(len(nis)) + 1, lines)
     log_band(ax, *chi_square_interval(2))
-    return finish(fig, "", "image", "NIS")
+    return finish(fig, "image", "NIS")
 
 
 def plot_estimates(one: Gated, names: Mapping[str, str]) -> Figure:
@@ -425,7 +424,7 @@ def plot_estimates(one: Gated, names: Mapping[str, str]) -> Figure:
         draw_way(ax, way[0], _COLOURS[forms[0]], label, width=0.8, marker=".", ms=3)
     ax.plot(*one.targets[0, 0, ::-1], "k+", ms=13, mew=2, label="main object, truth")
     map_axes(ax)
-    return finish(fig, "")
+    return finish(fig)
 
 
 def plot_detections(one: Gated) -> Figure:
@@ -436,7 +435,7 @@ def plot_detections(one: Gated) -> Figure:
         draw_dots(ax, east, north, color, name, size=5, alpha=0.7)
     ax.plot(*one.targets[0, :, ::-1].T, "k+", ms=13, mew=2, label="truth")
     map_axes(ax)
-    return finish(fig, "")
+    return finish(fig)
 
 
 def run_figures(one: Gated, names: Mapping[str, str]) -> list[Shown]:

@@ -32,8 +32,15 @@ from wildlab.messages.quantities import percent_between
 from wildlab.planning.legs import Flying, Leg, Platform, SearchSensor, look_attitude
 from wildlab.planning.patterns import rectangle
 from wildlab.planning.planner import SEARCH, Horizon, InformationPlanner, best_goal, initial_information
-from wildlab.reporting.charts.drawing import draw_way, finish
-from wildlab.reporting.charts.forms import Values, draw_fences, draw_heights, fit_map, lines_chart
+from wildlab.reporting.charts.drawing import (
+    Values,
+    draw_fences,
+    draw_heights,
+    draw_way,
+    finish,
+    fit_map,
+    lines_chart,
+)
 from wildlab.reporting.figures import (
     BLUE,
     GREEN,
@@ -462,7 +469,7 @@ def search_map(scene: PlanningScene, found: Searched, who: str) -> Figure:
             ax.plot(*places[which, 1::-1].T, "o", ms=6, mec=INK, mew=1.0, mfc=fill, label=name)
     fit_map(ax, np.concatenate(scene.world.areas), 45.0)
     map_axes(ax)
-    return finish(fig, "")
+    return finish(fig)
 
 
 def share_over_time(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:

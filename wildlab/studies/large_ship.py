@@ -18,8 +18,14 @@ from wildlab.analysis.tracks.pixels import CvTuning, PixelMeasurements, read_pix
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import georeference_pixels
-from wildlab.reporting.charts.drawing import draw_line, finish, new_strips
-from wildlab.reporting.charts.forms import draw_errors, draw_marks, draw_picture
+from wildlab.reporting.charts.drawing import (
+    draw_errors,
+    draw_line,
+    draw_marks,
+    draw_picture,
+    finish,
+    new_strips,
+)
 from wildlab.reporting.figures import BLUE, GREEN, INK, VERMILLION, map_axes, new_figure
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.twins import simulate_twin
@@ -281,7 +287,7 @@ def images(taken: Photographs) -> Figure:
         ax.add_patch(outline)
         draw_marks(ax, {"found": plain.uv[row], "moved": moved.uv[row], "true": plain.centre[row]})
         ax.set(xlim=(-reach, width + reach), ylim=(height + reach, -reach), facecolor="0.92")
-    return finish(fig, "")
+    return finish(fig)
 
 
 def positions(tracked: Mapping[str, Tracked], names: Mapping[str, str]) -> Figure:
@@ -306,4 +312,4 @@ def errors_and_speed(tracked: Mapping[str, Tracked], names: Mapping[str, str]) -
         ax.axvline(START_S, color=INK, lw=0.8, ls=":")
         ax.set_ylim(bottom=0)
     fast.set_ylabel("speed (m/s)")
-    return finish(fig, "", "time, segments joined (s)", "distance (m)")
+    return finish(fig, "time, segments joined (s)", "distance (m)")

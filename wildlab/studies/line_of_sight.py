@@ -26,8 +26,7 @@ from wildlab.geometry.line_of_sight import Looked, cast_rays, compare_angles, fi
 from wildlab.geometry.terrain import Terrain
 from wildlab.geometry.viewsheds import footprint, lines_clear
 from wildlab.messages.quantities import percent, percent_between
-from wildlab.reporting.charts.drawing import finish
-from wildlab.reporting.charts.forms import Values, draw_heights, fit_map, lines_chart
+from wildlab.reporting.charts.drawing import Values, draw_heights, finish, fit_map, lines_chart
 from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, VERMILLION, map_axes, new_figure
 from wildlab.reporting.published import bounds_of
 from wildlab.simulation.error_models import stream
@@ -387,7 +386,7 @@ def view_map(land: Terrain, view: TerrainView, names: Mapping[str, str]) -> Figu
         fit_map(ax, np.vstack([view.points, view.p_nc]), 10.0)
     map_axes(axes[0])
     map_axes(axes[1], north="")
-    return finish(fig, "")
+    return finish(fig)
 
 
 def agreement_table(runs: pd.DataFrame) -> pd.DataFrame:

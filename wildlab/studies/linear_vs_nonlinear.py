@@ -29,14 +29,15 @@ from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import innovation_whiteness
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
+from wildlab.reporting.charts.drawing import correlations_chart
 from wildlab.reporting.charts.tracks import (
     error_over_time,
-    innovation_correlations,
     speed_and_course,
     squares_over_time,
     track_map,
     values_over_flights,
 )
+from wildlab.reporting.figures import colour
 from wildlab.simulation.twins import simulate_twin
 from wildlab.studies.page import Shown
 from wildlab.tracking.motion import Motion, in_steps
@@ -227,24 +228,24 @@ def flight_figures(
         "nees": {who: one.scored.nees for who, one in tracks.items()},
         "nis": {who: _at_frames(seen, one.scored.nis) for who, one in tracks.items()},
     }
-    paths = track_map(seen.truth, {}, {}, "", measured=seen.positions, aircraft=seen.poses.p_nc)
+    paths = track_map(seen.truth, {}, {}, measured=seen.positions, aircraft=seen.poses.p_nc)
     speed = f"fig-{numbers['speed']}" if "speed" in numbers else "speed-and-course"
     return [
         Shown(paths, "paths", f"fig-{numbers['paths']}"),
         Shown(
-            track_map(seen.truth, states, called, "", measured=seen.positions),
+            track_map(seen.truth, states, called, measured=seen.positions),
             "map",
             f"fig-{numbers['map']}",
         ),
         Shown(
-            error_over_time(times, there, errors, called, "", measured=measured),
+            error_over_time(times, there, errors, called, measured=measured),
             "errors",
             f"fig-{numbers['errors']}",
         ),
-        Shown(speed_and_course(times, there, seen.truth, states, called, ""), "speed", speed),
+        Shown(speed_and_course(times, there, seen.truth, states, called), "speed", speed),
         *(
             Shown(
-                squares_over_time(times, there, {what.upper(): values[what]}, called, ""),
+                squares_over_time(times, there, {what.upper(): values[what]}, called),
                 what,
                 f"fig-{numbers['squares']}{letter}",
             )
@@ -258,12 +259,14 @@ def correlation_figure(
 ) -> Shown:
     """Autocorrelation of the innovations of tracks that see the same; ``number`` of the thesis's figure."""
     white = {who: innovation_whiteness(one.track.innovation, LAGS) for who, one in tracks.items()}
-    called = {who: names[who] for who in tracks}
-    correlations = {who: one.autocorrelation for who, one in white.items()}
+    lags = {
+        f"autocorrelation,\n{axis}": {
+            names[who]: (one.autocorrelation[i], colour(who)) for who, one in white.items()
+        }
+        for i, axis in enumerate(axes)
+    }
     bound = max(one.bound for one in white.values())
-    return Shown(
-        innovation_correlations(correlations, bound, called, "", axes), "correlation", f"fig-{number}"
-    )
+    return Shown(correlations_chart(lags, [bound] * len(axes)), "correlation", f"fig-{number}")
 
 
 def filters_table(runs: pd.DataFrame, names: Mapping[str, str], filters: Sequence[str]) -> pd.DataFrame:

@@ -43,17 +43,15 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
 from wildlab.messages.catalogue import Message, load_texts
 from wildlab.messages.quantities import significant
-from wildlab.reporting.charts.georeferencing import aircraft_map
 from wildlab.reporting.charts.navigation import (
     bias_chart,
     error_bands,
     mark_period,
     poses_between,
-    speed_chart,
     squares_chart,
     strips,
-    velocities_of,
 )
+from wildlab.reporting.charts.tracks import aircraft_map
 from wildlab.reporting.report import Report, Wording
 from wildlab.simulation.twins import simulate_twin
 from wildlab.studies.page import Shown, tile_of
@@ -275,7 +273,7 @@ def path_figures(studied: Studied, window: Period, figures: int) -> list[Shown]:
     below = truth[["north_m", "east_m"]].to_numpy(float)
     inside = truth["time_s"].between(float(seen[0]), float(seen[-1])).to_numpy()
     below = below[inside] if inside.sum() > 1 else below
-    fig = aircraft_map(path, places, below, "", "target")
+    fig = aircraft_map(path, places, below, "target")
     return [Shown(fig, "paths", "" if number is None else f"fig-7-{number}")]
 
 
@@ -298,11 +296,14 @@ def flight_figures(studied: Studied, window: Period, figures: int | None) -> lis
         {name: t.reindex(columns=nav["mekf"].columns) for name, t in nav.items()}, *window
     )
     _, velocity = poses_between(moving, *window)
-    speeds = {name: velocities_of(table[table["time_s"].between(*window)]) for name, table in moving.items()}
+    speeds = {
+        name: (times, {"speed over ground (m/s)": np.sqrt(sum(np.square(one) for one in parts.values()))})
+        for name, (times, parts) in velocity.items()
+    }
     shown = {
-        "attitude": (0, strips(attitude, "")),
-        "velocity": (1, strips(velocity, "")),
-        "speed": (4, speed_chart(speeds, "")),
+        "attitude": (0, strips(attitude)),
+        "velocity": (1, strips(velocity)),
+        "speed": (4, strips(speeds)),
     }
     return [
         _marked(studied, fig, text, "" if figures is None else f"fig-7-{figures + offset}")
@@ -317,11 +318,11 @@ def error_figures(studied: Studied, window: Period) -> list[Shown]:
     turns = {who: np.degrees(one.error[late, 6:]) for who, one in of.items()}
     largest = 3 * float(np.nanquantile(np.abs(turns["observer"]), 0.95))
     bounds = {"mekf": np.degrees(of["mekf"].sd[late, 6:])}
-    fig = error_bands(studied.times[late], turns, bounds, _TURNS, "", largest=largest)
+    fig = error_bands(studied.times[late], turns, bounds, _TURNS, largest=largest)
     found = [_marked(studied, fig, "attitude-errors")]
     if np.isfinite(of["mekf"].error[late, 3:6]).any():
         errors = {who: one.error[late, 3:6] for who, one in of.items()}
-        fig = error_bands(studied.times[late], errors, {"mekf": of["mekf"].sd[late, 3:6]}, _SPEEDS, "")
+        fig = error_bands(studied.times[late], errors, {"mekf": of["mekf"].sd[late, 3:6]}, _SPEEDS)
         found.append(_marked(studied, fig, "velocity-errors"))
     return found
 
@@ -333,7 +334,7 @@ def autopilot_figures(studied: Studied, tuned: str, begin: float, figures: int) 
 
     def bands(part: slice, scale: float, labels: Sequence[str]) -> Figure:
         errors, sd = scale * difference.error[late, part], scale * difference.sd[late, part]
-        return error_bands(studied.times[late], {"mekf": errors}, {"mekf": sd}, labels, "")
+        return error_bands(studied.times[late], {"mekf": errors}, {"mekf": sd}, labels)
 
     attitude, velocity = bands(slice(6, 9), float(np.degrees(1.0)), _TURNS), bands(slice(3, 6), 1.0, _SPEEDS)
     return [
@@ -347,7 +348,7 @@ def bias_figure(studied: Studied) -> Shown:
     biases = studied.found["mekf"].biases
     columns = [str(name) for name in biases if not str(name).startswith("sd_") and name != "time_s"]
     spread = biases[[f"sd_{name}" for name in columns]]
-    return Shown(bias_chart(biases["time_s"], biases[columns], spread, ""), "biases")
+    return Shown(bias_chart(biases["time_s"], biases[columns], spread), "biases")
 
 
 def nis_figure(studied: Studied, window: Period) -> Shown:
@@ -355,14 +356,14 @@ def nis_figure(studied: Studied, window: Period) -> Shown:
     raw = studied.found["mekf"].innovations
     raw = raw[raw["time_s"].between(*window)]
     nis = {str(name): (part["time_s"], part["nis"]) for name, part in raw.groupby("source", sort=False)}
-    return Shown(squares_chart(nis, 3, "NIS", ""), "nis")
+    return Shown(squares_chart(nis, 3, "NIS"), "nis")
 
 
 def nees_figure(studied: Studied, begin: float) -> Shown:
     """NEES of the filter over time, where there is a truth."""
     late, scored = studied.times >= begin, studied.scored["mekf"]
     nees = {name: (studied.times[late], values[late]) for name, values in scored.nees.items()}
-    return Shown(squares_chart(nees, 3, "NEES", ""), "nees")
+    return Shown(squares_chart(nees, 3, "NEES"), "nees")
 
 
 def simulated_figures(studied: Studied, window: Period, tuned: str, figures: int) -> list[Shown]:

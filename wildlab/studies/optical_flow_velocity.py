@@ -31,13 +31,13 @@ from wildlab.geometry.mount import Mount
 from wildlab.reporting.charts.drawing import (
     draw_dots,
     draw_line,
+    draw_picture,
     draw_way,
     finish,
     name_rows,
     new_strips,
     with_breaks,
 )
-from wildlab.reporting.charts.forms import draw_picture
 from wildlab.reporting.figures import BLUE, GREY, INK, ORANGE, VERMILLION, map_axes, new_figure
 from wildlab.simulation.scene.flights import SceneFlight, VesselLook, corner_of
 from wildlab.simulation.twins import AUTOPILOT, TRUTH, simulate_twin
@@ -393,7 +393,7 @@ def plot_path(looked: Looked) -> Figure:
     body = looked.scene.bodies(0)[0]
     ax.fill(*body.corners(body.layers[0], 0.0)[:, 1::-1].T, color=INK, label="ship")
     map_axes(ax)
-    return finish(fig, "")
+    return finish(fig)
 
 
 def plot_gimbal(looked: Looked) -> Figure:
@@ -406,7 +406,7 @@ def plot_gimbal(looked: Looked) -> Figure:
     )  # fmt: skip
     for name, colour in (("pan", BLUE), ("tilt", VERMILLION)):
         draw_line(ax, gimbal["time_s"], np.degrees(gimbal[f"{name}_rad"]), colour, name, width=1.7)
-    return finish(fig, "", "time (s)", "angle (deg)")
+    return finish(fig, "time (s)", "angle (deg)")
 
 
 def plot_features(looked: Looked) -> Figure:
@@ -431,7 +431,7 @@ def plot_flow(table: pd.DataFrame) -> Figure:
         draw_line(ax, *line, VERMILLION, "by the camera's motion", width=1.4)
         draw_dots(ax, table["time_s"], table[f"flow_{axis}"], BLUE, "measured", alpha=1.0)
         ax.set_ylabel(f"{name} (px/s)")
-    return finish(fig, "", "time (s)")
+    return finish(fig, "time (s)")
 
 
 def plot_velocity(table: pd.DataFrame) -> Figure:
@@ -451,7 +451,7 @@ def plot_velocity(table: pd.DataFrame) -> Figure:
         ax.axhline(0.0, color=INK, lw=1.2, label="truth")
         ax.axhline(float(np.nanmean(v)), color=VERMILLION, ls="--", lw=1.4, label="mean")
         ax.set_ylabel(f"{axis} (m/s)")
-    return finish(fig, "", "time (s)")
+    return finish(fig, "time (s)")
 
 
 def plot_readings(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
@@ -465,7 +465,7 @@ def plot_readings(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
         ax.text(value, row, f" {value:.1f}", va="center")
     name_rows(ax, [names[one] for one in READINGS])
     ax.set_xlim(0, 1.15 * max(medians))
-    return finish(fig, "", "SD along an axis (m/s)")
+    return finish(fig, "SD along an axis (m/s)")
 
 
 def readings_table(runs: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame:

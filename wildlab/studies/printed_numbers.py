@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from wildlab.flight.files import read_toml
 from wildlab.paths import DATA
-from wildlab.reporting.charts.forms import Values, rows_chart
+from wildlab.reporting.charts.drawing import Values, rows_chart
 from wildlab.reporting.figures import BLUE, INK, VERMILLION
 from wildlab.reporting.published import published_values
 from wildlab.studies.rules import Rules

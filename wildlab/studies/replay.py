@@ -23,7 +23,7 @@ from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import georeference_pixels, ground_to_pixel
 from wildlab.geometry.terrain import pixels_to_terrain
 from wildlab.replay.scene import Estimates, Points, ReplayScene
-from wildlab.reporting.charts.forms import draw_heights
+from wildlab.reporting.charts.drawing import draw_heights
 from wildlab.reporting.figures import (
     BLUE,
     GREEN,

@@ -53,15 +53,14 @@ from wildlab.flight.clocks import frame_times, poses_at
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array, Indices, matrix_to_euler, wrap
 from wildlab.geometry.uncertainty import ground_jacobians
-from wildlab.reporting.charts.drawing import finish, new_strips
-from wildlab.reporting.charts.forms import Values, draw_lines, plain_numbers
+from wildlab.reporting.charts.drawing import Values, draw_lines, finish, new_strips
 from wildlab.reporting.charts.tracks import (
     error_over_time,
     speed_and_course,
     squares_over_time,
     track_map,
 )
-from wildlab.reporting.figures import GREEN, GREY, INK, colour
+from wildlab.reporting.figures import GREEN, GREY, INK, colour, plain_numbers
 from wildlab.reporting.published import bounds_of
 from wildlab.simulation.twins import simulate_twin
 from wildlab.studies.page import Shown
@@ -677,7 +676,7 @@ def nees_over_pose_sd(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
         ax.set_xscale("log")
         plain_numbers(ax.xaxis)
     plain_numbers(upper.yaxis)
-    return finish(fig, "", "predicted SD of attitude, mean of roll, pitch and yaw (°)", "mean NEES")
+    return finish(fig, "predicted SD of attitude, mean of roll, pitch and yaw (°)", "mean NEES")
 
 
 def flight_figures(compared: Compared, first: int, names: Mapping[str, str]) -> list[Shown]:
@@ -691,9 +690,9 @@ def flight_figures(compared: Compared, first: int, names: Mapping[str, str]) -> 
         "NEES (position)": {who: scored[who].nees for who in PUBLISHED},
     }
     figures = {
-        "errors": error_over_time(t, seen.detected, errors, names, ""),
-        "map": track_map(seen.truth, states, names, "", measured=seen.positions[seen.detected]),
-        "speed": speed_and_course(t, seen.detected, seen.truth, states, names, ""),
-        "squares": squares_over_time(t, seen.detected, squares, names, ""),
+        "errors": error_over_time(t, seen.detected, errors, names),
+        "map": track_map(seen.truth, states, names, measured=seen.positions[seen.detected]),
+        "speed": speed_and_course(t, seen.detected, seen.truth, states, names),
+        "squares": squares_over_time(t, seen.detected, squares, names),
     }
     return [Shown(fig, text, f"fig-7-{n}") for n, (text, fig) in enumerate(figures.items(), first)]

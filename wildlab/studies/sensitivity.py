@@ -14,7 +14,7 @@ from wildlab.geometry.flodell import linear_enu_error
 from wildlab.geometry.frames import Array, euler_to_matrix
 from wildlab.geometry.georeference import pixel_to_plane
 from wildlab.geometry.mount import Mount, camera_pose, helgesen_misalignment
-from wildlab.reporting.charts.forms import fields_chart
+from wildlab.reporting.charts.drawing import fields_chart
 from wildlab.reporting.figures import BLUE, GREEN, INK, VERMILLION, end_label, new_figure
 
 #: The calibrated FLIR Tau 2 of H (2.3).

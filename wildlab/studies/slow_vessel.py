@@ -17,7 +17,8 @@ from wildlab.errors import WildlabError
 from wildlab.evaluation.errors import summarise
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
-from wildlab.reporting.charts.georeferencing import aircraft_map, errors_over_time, positions_map
+from wildlab.reporting.charts.drawing import with_breaks
+from wildlab.reporting.charts.tracks import aircraft_map, errors_over_time, positions_map
 from wildlab.reporting.figures import colour
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.target_motion import target_path
@@ -213,13 +214,17 @@ def map_figures(flight: Flight, scored: Mapping[str, pd.DataFrame]) -> list[Show
     path = nav[_PLACE].to_numpy()
     at = np.clip(np.searchsorted(nav["time_s"], table["time_s"]), 0, len(nav) - 1)
     return [
-        Shown(positions_map(table[_PLACE].to_numpy(), vessel, "", colour("observer")), "fig-5-11"),
+        Shown(positions_map(table[_PLACE].to_numpy(), vessel, colour("observer")), "fig-5-11"),
         *(
-            Shown(positions_map(points[column], meanwhile, "", colour(source), bounds), name)
+            Shown(positions_map(points[column], meanwhile, colour(source), bounds), name)
             for name, (column, source) in zip(("fig-5-10a", "fig-5-10b"), COLUMNS.items(), strict=True)
         ),
-        Shown(aircraft_map(path, path[at], vessel, ""), "fig-5-09"),
+        Shown(aircraft_map(path, path[at], vessel), "fig-5-09"),
     ]
+
+
+#: A longer pause in the observations breaks a line, s.
+PAUSE_S = 10.0
 
 
 def track_figures(scored: pd.DataFrame) -> list[Shown]:
@@ -227,6 +232,9 @@ def track_figures(scored: pd.DataFrame) -> list[Shown]:
     tracks = {"fig-5-12a": track_vessel(subset_of(scored)), "fig-5-12b": track_vessel(scored)}
     errors = {name: (np.hypot(*one.measured.T), np.hypot(*one.error.T)) for name, one in tracks.items()}
     reach = 1.05 * max(float(values.max()) for both in errors.values() for values in both)
-    return [
-        Shown(errors_over_time(one.times, *errors[name], "", reach), name) for name, one in tracks.items()
-    ]
+    shown = []
+    for name, one in tracks.items():
+        # A pause in the observations breaks the line.
+        (times, raw), (_, estimate) = (with_breaks(one.times, values, PAUSE_S) for values in errors[name])
+        shown.append(Shown(errors_over_time(times / 60, raw, estimate, "time (min)", reach=reach), name))
+    return shown

@@ -15,13 +15,9 @@ from wildlab.evaluation.consistency import autocorrelation
 from wildlab.evaluation.errors import summarise
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import Flight
-from wildlab.reporting.charts.georeferencing import (
-    autocorrelation_chart,
-    error_scatter,
-    filter_chart,
-    path_map,
-)
+from wildlab.reporting.charts.drawing import correlations_chart
 from wildlab.reporting.charts.navigation import poses_between, strips
+from wildlab.reporting.charts.tracks import aircraft_map, error_scatter, errors_over_time
 from wildlab.reporting.figures import BLUE, VERMILLION, colour
 from wildlab.simulation.onboard_sensors import as_mounted, mounted_imu
 from wildlab.simulation.parameters import load_twin
@@ -170,7 +166,7 @@ def scatter_figures(scored: Mapping[str, pd.DataFrame]) -> list[Shown]:
     *alike, _ = COLUMNS
     reach = 1.1 * max(float(np.abs(errors[column]).max()) for column in alike)
     return [
-        Shown(error_scatter(errors[column], "", color, reach if column in alike else None), name)
+        Shown(error_scatter(errors[column], color, reach if column in alike else None), name)
         for column, (name, color) in SCATTERS.items()
     ]
 
@@ -179,11 +175,14 @@ def flight_figures(flight: Flight, scored: pd.DataFrame) -> list[Shown]:
     """The path with the places of the observations, and attitude and velocity by both navigation sources."""
     seen = scored["time_s"].to_numpy()
     sources = {name: flight.nav[name] for name in (OBSERVER, "autopilot")}
+    nav = flight.nav[OBSERVER]
+    path = nav[["north_m", "east_m"]].to_numpy(float)
+    at = np.clip(np.searchsorted(nav["time_s"], seen), 0, len(nav) - 1)
     attitudes, velocities = poses_between(sources, seen.min(), seen.max())
     return [
-        Shown(path_map(flight.nav[OBSERVER], np.sort(seen), "", "antenna"), "fig-5-02"),
-        Shown(strips(attitudes, ""), "fig-5-03a"),
-        Shown(strips(velocities, ""), "fig-5-03b"),
+        Shown(aircraft_map(path, path[at], np.zeros((1, 2)), "antenna"), "fig-5-02"),
+        Shown(strips(attitudes), "fig-5-03a"),
+        Shown(strips(velocities), "fig-5-03b"),
     ]
 
 
@@ -196,10 +195,12 @@ def filter_figures(scored: pd.DataFrame, bound: float) -> list[Shown]:
     ordered = scored.sort_values("time_s", kind="stable")
     measured, estimated = np.hypot(*errors_of(ordered).T), np.hypot(*track.x.T)
     predicted = np.sqrt(np.trace(track.P, axis1=1, axis2=2))
-    correlations = {
-        axis: autocorrelation(track.innovation[1:, i], LAGS) for i, axis in enumerate(("north", "east"))
+    lags = {
+        axis: (autocorrelation(track.innovation[1:, i], LAGS), color)
+        for i, (axis, color) in enumerate((("north", BLUE), ("east", VERMILLION)))
     }
+    index = np.arange(len(measured))
     return [
-        Shown(filter_chart(measured, estimated, 2 * predicted, ""), "fig-5-06"),
-        Shown(autocorrelation_chart(correlations, bound, ""), "fig-5-07"),
+        Shown(errors_over_time(index, measured, estimated, "observation", 2 * predicted), "fig-5-06"),
+        Shown(correlations_chart({"autocorrelation": lags}, [bound]), "fig-5-07"),
     ]

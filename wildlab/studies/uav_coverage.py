@@ -29,8 +29,7 @@ from wildlab.planning.courses import Course, fly, follow_terrain
 from wildlab.planning.coverage import Coverage, first_seen, nodes_in, see, walks
 from wildlab.planning.gimbal import camera_on_course, look_down, swing_yaw
 from wildlab.planning.patterns import lawn_mowers
-from wildlab.reporting.charts.drawing import draw_way
-from wildlab.reporting.charts.forms import Values, draw_fences, rows_chart
+from wildlab.reporting.charts.drawing import Values, draw_fences, draw_way, rows_chart
 from wildlab.reporting.figures import BLUE, GREEN, ORANGE, VERMILLION, map_axes, new_figure
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.landscape import EAST_M, NORTH_M, synthetic_landscape

@@ -30,8 +30,15 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.covariances import inside_ellipse
 from wildlab.geometry.frames import Array, Indices, Mask
 from wildlab.messages.catalogue import load_texts
-from wildlab.reporting.charts.drawing import draw_dots, finish, name_rows
-from wildlab.reporting.charts.forms import Values, draw_picture, rows_chart, spread_points
+from wildlab.reporting.charts.drawing import (
+    Values,
+    draw_dots,
+    draw_picture,
+    finish,
+    name_rows,
+    rows_chart,
+    spread_points,
+)
 from wildlab.reporting.figures import BLUE, INK, ORANGE, VERMILLION, new_figure
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.parameters import load_twin
@@ -586,4 +593,4 @@ def plot_cut_shares(objects: pd.DataFrame) -> Figure:
         draw_dots(ax, share, row + spread_points(len(share), 0.25), colour, size=10, alpha=0.8)
     name_rows(ax, ["found", "missed"])
     ax.set_xlim(-2, 102)
-    return finish(fig, "", "visible part of the outline (%)")
+    return finish(fig, "visible part of the outline (%)")

@@ -14,7 +14,7 @@ from wildlab.detection.boards import Board
 from wildlab.geometry.camera import Camera, normalise, undistort, undistort_approximately
 from wildlab.geometry.frames import Array
 from wildlab.geometry.intrinsics import PINHOLE, calibrate_camera, project_board
-from wildlab.reporting.charts.forms import fields_chart
+from wildlab.reporting.charts.drawing import fields_chart
 from wildlab.reporting.published import error_name
 from wildlab.simulation.boards import board_views
 

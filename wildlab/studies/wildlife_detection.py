@@ -29,7 +29,7 @@ from wildlab.evaluation.intervals import Interval, mean_interval
 from wildlab.evaluation.matching import Rates, rates, shares
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import Array
-from wildlab.reporting.charts.forms import Values, draw_picture, rows_chart
+from wildlab.reporting.charts.drawing import Values, draw_picture, rows_chart
 from wildlab.reporting.figures import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION, new_figure
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.manifest import twin_manifest

@@ -46,8 +46,7 @@ from wildlab.planning.courses import fly, follow_terrain
 from wildlab.planning.coverage import walks
 from wildlab.planning.gimbal import GimbalAngles, camera_on_course, swing_roll
 from wildlab.planning.patterns import Pattern, check_area, contains, lawn_mowers
-from wildlab.reporting.charts.drawing import draw_dots, draw_way, finish
-from wildlab.reporting.charts.forms import draw_fences, fit_map, spread_points
+from wildlab.reporting.charts.drawing import draw_dots, draw_fences, draw_way, finish, fit_map, spread_points
 from wildlab.reporting.figures import (
     BLUE,
     GREY,
@@ -517,7 +516,7 @@ def tracks_map(world: World, followed: TrackedAnimals, share: float) -> Figure:
     # Whatever an ellipse reaches to.
     fit_map(ax, np.concatenate([*world.fences, way]), 25.0)
     map_axes(ax)
-    return finish(fig, "")
+    return finish(fig)
 
 
 def _at(known: list[Known], times: Array, time: float) -> Known:
@@ -580,7 +579,7 @@ def visit_maps(world: World, flown: Patrolled) -> Figure | None:
         ax.set(xlim=(middle[1] - 160, middle[1] + 160), ylim=(middle[0] - 95, middle[0] + 95))
         map_axes(ax, scale_bar=ax is axes[-1], east="east (m)" if ax is axes[-1] else "")
         ax.set_title(f"{what}: SD {sd:.1f} m")
-    return finish(fig, "")
+    return finish(fig)
 
 
 def negative_differences(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
@@ -598,4 +597,4 @@ def negative_differences(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure
                 ax.errorbar(place + 0.3, found.estimate, bar, fmt="D", color=INK, ms=5, capsize=4)
         ax.axhline(0, color=GREY, lw=1.0)
         ax.set(title=label, xlim=(-0.5, 1.6), xticks=[0, 1], xticklabels=[names[one] for one in platforms])
-    return finish(fig, "", ylabel="with less without (m)")
+    return finish(fig, ylabel="with less without (m)")

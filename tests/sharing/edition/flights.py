@@ -6,9 +6,10 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from wildlab.analysis.verdict import Gain
 from wildlab.reporting.metrics import metric
 from wildlab.reporting.own_flights import OwnFlight, OwnReport
-from wildlab.sharing.edition_story import Facts, Gain
+from wildlab.sharing.edition_story import Facts
 
 NAN = math.nan
 

@@ -16,33 +16,38 @@ from tests.flight.conftest import make_flight  # noqa: F401 - a fixture of anoth
 from tests.sharing.edition.flights import EMPTY, NAN, WHOLE
 from tests.sharing.left import leave_report
 from wildlab.analysis.georeference import observe
+from wildlab.analysis.overview import Alarm
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.messages.catalogue import Day, load_language
 from wildlab.reporting.metrics import metric
-from wildlab.reporting.page import POLICY
+from wildlab.reporting.text import POLICY
 from wildlab.runner.record.own_flights import own_flights
 from wildlab.sharing.edition import (
     FOOT,
     HEIGHT,
     WIDTH,
     MapPicture,
-    Place,
     edition_html,
     map_of,
     picture_html,
 )
-from wildlab.sharing.edition_story import Alarm, facts_of
+from wildlab.sharing.edition_story import facts_of
+from wildlab.sharing.tiers import Cell
 
 MAP = MapPicture(
     np.array([[0.0, 0.0], [0.0, 400.0], [300.0, 400.0], [300.0, 0.0]]),
     np.random.default_rng(1).normal(150, 9, (60, 2)),
     np.array([[150.0, 150.0]]),
 )
+SHAKES = Alarm("shakes", 1, NAN, 70.0, NAN)
 CASES = {
     "whole": (WHOLE, MAP),
     "twin": (WHOLE._replace(verdict="sound", gains=(), twin=True), None),
-    "alarm": (WHOLE._replace(verdict="went wrong", alarms=(Alarm("leans", 120.0, 1),)), MAP),
-    "look": (WHOLE._replace(verdict="look closer", gains=(), alarms=(Alarm("shakes", 70.0, 1),)), None),
+    "alarm": (WHOLE._replace(verdict="went wrong", alarms=(Alarm("leans", 1, NAN, 120.0, NAN),)), MAP),
+    "look": (
+        WHOLE._replace(verdict="look closer", gains=(), alarms=(SHAKES,)),
+        None,
+    ),
     "empty": (EMPTY._replace(failed=("georeferencing",)), None),
 }
 
@@ -70,7 +75,7 @@ def pages(browser: Any, tmp_path: Path) -> Iterator[Any]:
 @pytest.mark.parametrize("case", CASES)
 def test_seen_by_everybody(case, pages):
     facts, picture = CASES[case]
-    html = edition_html(facts, name="f", place=Place(), picture=picture)
+    html = edition_html(facts, name="f", place=None, picture=picture)
     for options in ({}, {"color_scheme": "dark"}):
         page = pages(html, 1200, **options)
         assert [one["id"] for one in Axe().run(page).response["violations"]] == []
@@ -95,28 +100,25 @@ def test_seen_by_everybody(case, pages):
 @pytest.mark.parametrize("case", CASES)
 def test_it_asks_nobody_and_runs_nothing(case):
     facts, picture = CASES[case]
-    html = edition_html(facts, name="f", place=Place(), picture=picture)
+    html = edition_html(facts, name="f", place=None, picture=picture)
     assert POLICY in html and "<script" not in html and "http" not in html.replace("http-equiv", "")
     assert len(html) < 200_000
 
 
 def test_names_are_harmless():
-    html = edition_html(WHOLE, name="<script>x</script>{p90}", place=Place(1600.0))
+    html = edition_html(WHOLE, name="<script>x</script>{p90}", place=None)
     assert "<script" not in html and "<img" not in html and "&lt;script&gt;x&lt;/script&gt;{p90}" in html
 
 
 def test_places_and_days_are_said_as_far_as_they_are_given():
-    told = edition_html(WHOLE, name="f", place=Place(1600.0, (-24.9, 31.5)))
+    told = edition_html(WHOLE, name="f", place=Cell(-24.9, 31.5, 0.1, 1600.0))
     assert "24.9° S, 31.5° E" in told and "1.6\u00a0km" in told and "2026" not in told
-    month = edition_html(WHOLE, name="f", place=Place(), day=Day(date(2026, 3, 14), False))
+    month = edition_html(WHOLE, name="f", place=None, day=Day(date(2026, 3, 14), False))
     assert (
         "March 2026" in month
         and "14" not in re.sub(r"<style>.*?</style>", "", month, flags=re.S).split("<h1>")[0]
     )
-    # A distance from what is not shown says nothing.
-    nowhere = edition_html(WHOLE, name="f", place=Place(1600.0))
-    assert "1.6" not in nowhere.partition("<main>")[2]
-    norwegian = edition_html(WHOLE, name="f", place=Place(920.0, (58.66, -16.4)), language="nb")
+    norwegian = edition_html(WHOLE, name="f", place=Cell(58.66, -16.4, 0.01, 920.0), language="nb")
     assert "58,66° N, 16,4° V" in norwegian
 
 
@@ -132,7 +134,7 @@ def sound(reports: Path) -> None:
 
 def made(reports: Path, **more: Any) -> str:
     (own,) = own_flights(reports, ())
-    return edition_html(facts_of(own), name="flight 1", place=Place(), **more)
+    return edition_html(facts_of(own), name="flight 1", place=None, **more)
 
 
 def test_the_page_of_a_folder_of_reports(tmp_path):

@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.sharing.edition.flights import EMPTY, NAN, WHOLE
-from wildlab.analysis.overview import ALARMS
-from wildlab.analysis.verdict import CAUSES, PARTS, Verdict
+from wildlab.analysis.overview import ALARMS, Alarm
+from wildlab.analysis.verdict import CAUSES, PARTS, Gain, Verdict
 from wildlab.messages.catalogue import Message, languages, length, load_language, say
-from wildlab.sharing.edition_story import _TROUBLES, STEP_M, Alarm, Facts, Gain, Story, steps_of, tell
+from wildlab.sharing.edition_story import _TROUBLES, STEP_M, Facts, Story, steps_of, tell
 
 LANGUAGES = [load_language(code) for code in languages()]
 RADAR = EMPTY._replace(
@@ -34,7 +34,7 @@ def test_a_flight_of_which_all_is_known():
 
 
 def test_an_alarm_comes_before_every_gain_and_takes_the_trust():
-    story = tell(WHOLE._replace(verdict="went wrong", alarms=(Alarm("jumps", 12.0, 2),)))
+    story = tell(WHOLE._replace(verdict="went wrong", alarms=(Alarm("jumps", 2, NAN, 12.0, NAN),)))
     assert story.why == Message("alarm.jumps", story.why.values, 2)
     assert keys(story.advice)[:2] == ["do.jumps", "do.cause_boresight"] and not story.trusted
 
@@ -129,7 +129,9 @@ gains = st.builds(
     Gain, st.sampled_from(KEYS), st.lists(st.sampled_from(list(CAUSES)), unique=True).map(tuple),
     st.one_of(st.just(NAN), st.floats(1, 1e3)), st.floats(1e3, 1e4), st.floats(0.005, 1),
 )  # fmt: skip
-alarms = st.builds(Alarm, st.sampled_from(list(ALARMS)), st.floats(1, 99), st.integers(1, 3))
+alarms = st.builds(
+    Alarm, st.sampled_from(list(ALARMS)), st.integers(1, 3), st.just(NAN), st.floats(1, 99), st.just(NAN)
+)
 troubles = st.tuples(st.sampled_from(list(_TROUBLES.values())), st.floats(0, 1e4))
 facts = st.builds(
     Facts, twin=st.booleans(), verdict=st.sampled_from([*Verdict, None]), problems=st.integers(0, 3),

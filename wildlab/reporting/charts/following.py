@@ -1,38 +1,44 @@
-"""Charts of a flight's tracks by any sensor: maps, squares and errors over time, gains, and whiteness."""
+"""Charts of a flight's tracks by any sensor: maps, squares and errors over time, and whiteness; and of many
+targets at once: identities on a map and over time, and what is wrong at each look."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.ticker import NullLocator
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
-from wildlab.analysis.tracks.scores import is_at_rest, seen_of, whitened
+from wildlab.analysis.tracks.many import ManyTracks, known_scans
+from wildlab.analysis.tracks.scores import is_at_rest, whitened
 from wildlab.analysis.tracks.single_target import SMOOTHED, SensorTrack
 from wildlab.analysis.tracks.tracker import TrackingResult
 from wildlab.evaluation.consistency import autocorrelation, chi_square_interval, white_bound
+from wildlab.evaluation.identities import Identities
 from wildlab.geometry.frames import Array
+from wildlab.messages.catalogue import fill, load_texts
 from wildlab.messages.quantities import length
 from wildlab.reporting.charts.drawing import (
     LINES,
     TRUTH,
     Shown,
+    correlations_chart,
     draw_dots,
     draw_line,
     draw_platform,
     draw_way,
     finish,
+    name_rows,
     new_strips,
+    with_breaks,
 )
-from wildlab.reporting.charts.tracks import innovation_correlations
 from wildlab.reporting.figures import (
     INK,
     ORANGE,
-    WORDS,
+    VERMILLION,
     Powers,
     colour,
     filter_words,
@@ -51,12 +57,6 @@ LAGS, MARGIN = 20, 0.15
 UNEVEN = 20.0
 #: A pause in the detections longer than this many of its usual intervals is shaded.
 PAUSE = 5.0
-#: The filters that know of white noise alone: the others are held against the first that is there.
-PLAIN = ("ekf", "kf")
-#: Filters that are drawn beside it, each in a strip of its own.
-MOST_STRIPS = 4
-#: Errors that differ by less than this share of the plain filter's are as large.
-ALIKE_SHARE = 0.01
 
 
 def slug(*words: str) -> str:
@@ -109,11 +109,8 @@ def map_shown(
         (bottom, left), (top, right) = low - margin, high + margin
         ax.set(xlim=(left, right), ylim=(bottom, top))
     map_axes(ax)
-    drawn = ", ".join(one.sensor for one in mine)
-    alt = f"Map in local metres of the track of {target} by {drawn}, with {filter_words(name)}"
-    alt += ", beside its true way." if len(truth) else "."
-    finish(fig, f"{target}: {filter_words(name)}")
-    return fig, slug("map", target), alt, "Tracks that leave the surroundings are cut off."
+    finish(fig)
+    return captioned(fig, "tracking", "map", slug("map", target), target=target, filter=filter_words(name))
 
 
 def _middle(x: Array) -> Array:
@@ -148,13 +145,8 @@ def squares_shown(tracks: Sequence[SensorTrack], rows: pd.DataFrame, what: str) 
     used = first.times[np.isfinite(first.nis)]
     if len(used) > 2:
         mark_gaps(ax, used, max(PAUSE * float(np.median(np.diff(used))), 1.0))
-    title = f"{_of(first)}: mean {what.upper()}, {dof:g} is right\n{_brief(drawn)}"
-    finish(fig, title, "time (s)", "NEES of the position" if what == "nees" else "NIS of the detections")
-    alt = (
-        f"{what.upper()} over time of {_of(first)} on a logarithmic axis with the 95 percent band; means: "
-        f"{_each(drawn)}."
-    )
-    return fig, _name(what, first), alt, f"Means: {_each(drawn)}; {dof:g} is ideal."
+    finish(fig, "time (s)", "NEES of the position" if what == "nees" else "NIS of the detections")
+    return _of_filters(fig, "squares", what, first, drawn, score=what.upper(), dof=f"{dof:g}")
 
 
 def errors_shown(tracks: Sequence[SensorTrack], rows: pd.DataFrame) -> Shown:
@@ -181,11 +173,8 @@ def errors_shown(tracks: Sequence[SensorTrack], rows: pd.DataFrame) -> Shown:
         ax.yaxis.set_major_formatter(Powers())
     else:
         ax.set_ylim(bottom=0)
-    title = f"{_of(first)}: root mean square error\n{_brief(drawn)}"
-    finish(fig, title, "time (s)", "distance from the truth (m)")
-    alt = f"Distance from the truth over time of {_of(first)}; root mean squares: {_each(drawn)}."
-    caption = "Dotted: reported standard deviation. Means: over scans in which the target was detected."
-    return fig, _name("error", first), alt, caption
+    finish(fig, "time (s)", "error (m)")
+    return _of_filters(fig, "errors", "error", first, drawn)
 
 
 def whiteness_shown(tracks: Sequence[SensorTrack], elements: Sequence[str]) -> Shown | None:
@@ -194,28 +183,41 @@ def whiteness_shown(tracks: Sequence[SensorTrack], elements: Sequence[str]) -> S
     white = {one.filter: found for one in tracks if len(found := whitened(one)) > LAGS + 2}
     if not white:
         return None
-    series = {
-        name: np.stack([autocorrelation(column, LAGS) for column in one.T]) for name, one in white.items()
+    series = {name: [autocorrelation(column, LAGS) for column in found.T] for name, found in white.items()}
+    far = {
+        name: f"{max((r[1] for r in columns), key=abs):+.2f}".replace("-", "−")
+        for name, columns in series.items()
     }
-    far = {name: f"{max(r[:, 1], key=abs):+.2f}".replace("-", "−") for name, r in series.items()}
-    names = {name: WORDS.get(name, filter_words(name)) for name in series}
-    title = f"{_of(first)}: autocorrelation at lag one\n{_brief(far)}"
-    axes = tuple(f"element {i + 1}" for i in range(len(elements))) if len(elements) > 1 else (elements[0],)
-    fig = innovation_correlations(series, white_bound(max(map(len, white.values()))), names, title, axes)
-    alt = (
-        f"Autocorrelation of the innovations of {_of(first)} over {LAGS} lags with the band of white noise; "
-        f"at lag one: {_each(far)}."
-    )
-    caption = "Innovations in units of their own standard deviation; grey: where white noise stays with 95 %."
-    return fig, _name("whiteness", first), alt, caption
+    labels = [f"element {i + 1}" for i in range(len(elements))] if len(elements) > 1 else elements
+    strips = {
+        f"autocorrelation,\n{label}": {
+            filter_words(name): (columns[i], _tint(name)) for name, columns in series.items()
+        }
+        for i, label in enumerate(labels)
+    }
+    fig = correlations_chart(strips, [white_bound(max(map(len, white.values())))] * len(strips))
+    return _of_filters(fig, "whiteness", "whiteness", first, far, lags=str(LAGS))
 
 
-def _of(track: SensorTrack) -> str:
-    return f"{track.target} by {track.sensor}"
+def captioned(fig: Figure, page: str, key: str, name: str, **values: str) -> Shown:
+    """A figure with its name, and its title, alternative text and caption out of a page's catalogue."""
+    text = load_texts(page).figures[key]
+    title, alt, caption = (fill(one, {}, values) for one in (text.title, text.alt, text.caption))
+    fig.axes[0].set_title(title)
+    return fig, name, alt, caption
 
 
-def _name(what: str, track: SensorTrack) -> str:
-    return slug(what, track.sensor, track.target)
+def _of_filters(
+    fig: Figure, key: str, what: str, first: SensorTrack, drawn: Mapping[str, str], **values: str
+) -> Shown:
+    """A figure of one target by one sensor, with a number of each filter; titles have no room for many."""
+    brief = [f"{short_words(name)} {value}" for name, value in drawn.items()]
+    values |= {
+        "of": f"{first.target} by {first.sensor}",
+        "brief": " · ".join(brief[:3]) + (" …" if len(brief) > 3 else ""),
+        "each": "; ".join(f"{filter_words(name)} {value}" for name, value in drawn.items()),
+    }
+    return captioned(fig, "tracking", key, slug(what, first.sensor, first.target), **values)
 
 
 def _tint(name: str) -> str:
@@ -228,17 +230,6 @@ def _rows_of(tracks: Sequence[SensorTrack], rows: pd.DataFrame) -> pd.DataFrame:
     return rows[mine].set_index("filter")
 
 
-def _each(values: dict[str, str]) -> str:
-    """A value of each filter, in words."""
-    return "; ".join(f"{filter_words(name)} {value}" for name, value in values.items())
-
-
-def _brief(values: dict[str, str]) -> str:
-    """The same, no more than fit into a title."""
-    brief = [f"{short_words(name)} {value}" for name, value in values.items()]
-    return " · ".join(brief[:3]) + (" …" if len(brief) > 3 else "")
-
-
 def _lines(one: SensorTrack, values: Array) -> tuple[Array, Array]:
     """Times and values (K,) of the looks that have one, thinned; NaN between one track and the next."""
     rows = np.flatnonzero(np.isfinite(values))
@@ -247,145 +238,113 @@ def _lines(one: SensorTrack, values: Array) -> tuple[Array, Array]:
     return np.insert(one.times[rows], new, np.nan), np.insert(values[rows], new, np.nan)
 
 
-class Beside(NamedTuple):
-    """How much nearer to the truth a filter is than the plain one, look by look.
-
-    Attributes
-    ----------
-    filter
-        Its name.
-    times, gain
-        (N,) seconds and metres, of the looks at which the target is seen and both have an error; below zero
-        it is farther off.
-    nearer, farther
-        Shares of these looks. The rest is as far off, to `ALIKE_SHARE`.
-    middle
-        Median of ``gain``.
-    """
-
-    filter: str
-    times: Array
-    gain: Array
-    nearer: float
-    farther: float
-    middle: float
+#: Tracks that have a colour and a name of their own in a map: the longest.
+MOST_NAMED = 6
+#: Letters of a target's name in a chart.
+LONGEST_NAME = 14
+#: Looks farther apart than so many usual ones are no line.
+LONG_PAUSE = 8.0
 
 
-def beside_plain(tracks: Sequence[SensorTrack]) -> tuple[str, list[Beside]]:
-    """Each filter's errors beside the plain one's.
-
-    Parameters
-    ----------
-    tracks
-        Of one target by one sensor, with one filter each.
-
-    Returns
-    -------
-    plain : str
-        The name of the plain filter; "" where it is not among them.
-    others : list of Beside
-        In the order of the tracks, of those that share looks with it.
-    """
-    by_name = {one.filter: one for one in tracks}
-    plain = next((name for name in PLAIN if name in by_name), "")
-    found: list[Beside] = []
-    for one in tracks if plain else ():
-        white = by_name[plain]
-        _, mine, theirs = np.intersect1d(one.times, white.times, return_indices=True)
-        away, other = _off_where_seen(one)[mine], _off_where_seen(white)[theirs]
-        both = np.isfinite(away) & np.isfinite(other)
-        if one.filter == plain or not both.any():
-            continue
-        gain, alike = (other - away)[both], ALIKE_SHARE * other[both]
-        shares = float((gain > alike).mean()), float((gain < -alike).mean())
-        found.append(Beside(one.filter, one.times[mine][both], gain, *shares, float(np.median(gain))))
-    return plain, found
+def ways_of(followed: ManyTracks) -> dict[int, Array]:
+    """(L, 3) times and places of every track, the longest first."""
+    ways: dict[int, list[tuple[float, float, float]]] = {}
+    for look in followed.shown:
+        for identity, x in zip(look.identity, look.x, strict=True):
+            ways.setdefault(int(identity), []).append((look.time, float(x[0]), float(x[1])))
+    longest = sorted(ways, key=lambda name: (-len(ways[name]), name))
+    return {name: np.array(ways[name]) for name in longest}
 
 
-def _off_where_seen(one: SensorTrack) -> Array:
-    """(N,) distance from the truth, m; NaN at looks at which the target is not seen."""
-    return np.where(seen_of(one), np.hypot(*one.error[:, :2].T), np.nan)
+def parted(way: Array, times: list[float]) -> Array:
+    """A way (L, 3) of times and places, with a row of NaN wherever it misses some of the times."""
+    # Several sensors may look at one time.
+    order = np.searchsorted(np.unique(times), way[:, 0])
+    return np.asarray(np.insert(way, np.flatnonzero(np.diff(order) > 1) + 1, np.nan, axis=0))
 
 
-def beside_plain_shown(tracks: Sequence[SensorTrack]) -> Shown | None:
-    """How much nearer to the truth each filter of a target by a sensor is than the plain one, over time.
+def short_name(name: object) -> str:
+    """A target's name as far as there is room for it."""
+    text = str(name)
+    return text if len(text) <= LONGEST_NAME else f"{text[: LONGEST_NAME - 1]}…"
 
-    One strip for each, so that no line hides another; None where there is nothing to hold against it.
-    """
-    first = tracks[0]
-    plain, others = beside_plain(tracks)
-    if not others:
-        return None
-    shown = others[:MOST_STRIPS]
-    fig, strips = new_strips(len(shown), 1.3 * len(shown) + 2.0, 5.8, sharey=True)
-    for ax, one in zip(strips, shown, strict=True):
-        keep = thinned(len(one.times))
-        draw_dots(ax, one.times[keep], one.gain[keep], _tint(one.filter), size=5, alpha=1.0)
-        ax.axhline(0, color=INK, lw=0.8)
-        ax.set_ylabel(short_words(one.filter))
-    even = _even_up_to(strips[0], np.abs(np.concatenate([one.gain for one in shown])))
-    fig.supylabel(f"nearer than {short_words(plain)} by (m)", fontsize=10)
-    brief = _brief({one.filter: _percent(one.nearer) for one in shown})
-    finish(fig, f"{_of(first)}, looks nearer than {short_words(plain)}:\n{brief}", "time (s)")
-    said = "; ".join(
-        f"{filter_words(one.filter)} nearer at {_percent(one.nearer)} and farther at {_percent(one.farther)} "
-        f"of {len(one.gain)} looks, {_nearer(one.middle)} in the middle"
-        for one in others
+
+def colours_of(followed: ManyTracks) -> dict[object, str]:
+    """By identity: the longest tracks have a colour of their own in every chart, the others that of ink."""
+    names = list(ways_of(followed))
+    own = dict(zip(names, SENSOR_COLOURS[:MOST_NAMED], strict=False))
+    return {name: own.get(name, INK) for name in names}
+
+
+def tracks_shown(followed: ManyTracks) -> Shown:
+    """Where every track went, in local metres, north up, beside the true ways."""
+    fig, ax = new_figure(5.6, 5.4)
+    for way in followed.truth.values():
+        draw_way(ax, way, name="truth", zorder=3, **TRUTH)
+    if followed.scans:
+        draw_platform(ax, np.array([scan.platform for scan in followed.scans]), "platform")
+    ways, tints = ways_of(followed), colours_of(followed)
+    times = [look.time for look in followed.shown]
+    for identity, way in ways.items():
+        # Where a track is absent for a while no line says where it was.
+        tint, named = tints[identity], tints[identity] != INK
+        name = f"track {identity}" if named else "other tracks"
+        draw_way(ax, parted(way, times)[:, 1:], tint, name, width=1.8 if named else 1.0)
+        ax.plot(way[:1, 2], way[:1, 1], "o", color=tint, ms=5)
+    map_axes(ax)
+    finish(fig)
+    values = {"tracks": len(ways), "targets": len(followed.truth), "most": MOST_NAMED}
+    return captioned(fig, "tracking-many", "map", "map", **{key: str(n) for key, n in values.items()})
+
+
+def identities_shown(followed: ManyTracks, lives: Identities) -> Shown:
+    """Which track is on each target, over time."""
+    names = [name for name, life in lives.targets.items() if life.visible]
+    fig, ax = new_figure(5.8, 1.6 + 0.5 * len(names))
+    times, tints = _times_of(followed), colours_of(followed)
+    for row, name in enumerate(names):
+        on = [one.get(name) for one in lives.followed]
+        for identity in dict.fromkeys(one for one in on if one is not None):
+            mine = np.array([one == identity for one in on])
+            ax.plot(times[mine], np.full(int(mine.sum()), row), "|", color=tints[identity], ms=11, mew=1.6)
+    name_rows(ax, [short_name(name) for name in names])
+    finish(fig, "time since the first look (s)")
+    values = {"changes": lives.swaps + lives.breaks, "targets": len(names), "most": MOST_NAMED}
+    given = {key: str(n) for key, n in values.items()}
+    return captioned(fig, "tracking-many", "identities", "identities", **given)
+
+
+def wrong_shown(followed: ManyTracks, lives: Identities) -> Shown:
+    """GOSPA at each look, and how many targets are missed and tracks false."""
+    fig, (upper, lower) = new_strips(2, 4.2, 5.8)
+    times = _times_of(followed)
+    distance, missed, false = (
+        np.array([getattr(one, part) for one in lives.gospa]) for part in ("distance", "n_missed", "n_false")
     )
-    alt = (
-        f"How much nearer to the truth each filter has {_of(first)} than {filter_words(plain)} where it is "
-        f"seen, over time, in a strip for each: {said}."
-    )
-    caption = (
-        f"{said[0].upper()}{said[1:]}. Above zero is nearer, below it farther. Of looks with the target "
-        f"seen; errors that differ by less than {100 * ALIKE_SHARE:g} % are neither."
-    )
-    caption += f" The axis is even up to {even:g} m and logarithmic beyond." if even else ""
-    caption += f" Drawn are {len(shown)} of {len(others)}." if len(others) > len(shown) else ""
-    return fig, slug("beside", plain, first.sensor, first.target), alt, caption
+    draw_dots(upper, times, distance, SENSOR_COLOURS[0], alpha=1.0)
+    upper.axhline(distance.mean(), color=INK, lw=1.2, ls="--")
+    pause = LONG_PAUSE * float(np.median(np.diff(times))) if len(times) > 1 else 1.0
+    # Over a pause no line says what nobody looked at.
+    draw: dict[str, Any] = {"width": 1.4, "drawstyle": "steps-mid"}
+    draw_line(lower, *with_breaks(times, missed, pause), SENSOR_COLOURS[0], "targets missed", **draw)
+    draw_line(lower, *with_breaks(times, -false, pause), VERMILLION, "tracks on nothing", **draw)
+    most = max(int(missed.max()), int(false.max()), 1)
+    lower.set(ylabel="how many", ylim=(-most - 0.5, most + 0.5))
+    lower.yaxis.set_major_locator(MaxNLocator(5, integer=True))
+    lower.yaxis.set_major_formatter(lambda value, _: f"{abs(value):.0f}")
+    mark_gaps(upper, times, pause)
+    finish(fig, "time since the first look (s)", "GOSPA (m)")
+    values = {
+        "mean": f"{distance.mean():.1f}",
+        "cutoff": f"{followed.cutoff_m:g}",
+        "looks": str(len(times)),
+        "missed": str(int((missed > 0).sum())),
+        "false": str(int((false > 0).sum())),
+    }
+    return captioned(fig, "tracking-many", "gospa", "gospa", **values)
 
 
-def _even_up_to(ax: Axes, sizes: Array) -> float:
-    """Make an axis logarithmic beyond the returned value, m, where a few large values would press the others
-    flat; 0 where they do not."""
-    middle, largest = float(np.median(sizes)), float(sizes.max())
-    if not 0 < UNEVEN * middle < largest:
-        return 0.0
-    even = float(10 ** np.round(np.log10(middle)))
-    ax.set_yscale("symlog", linthresh=even)
-    ax.set_yticks(_ticks(even, largest), minor=False)
-    ax.yaxis.set_minor_locator(NullLocator())
-    ax.yaxis.set_major_formatter(Powers())
-    return even
-
-
-def _ticks(even: float, largest: float) -> list[float]:
-    """Zero and powers of ten to both sides of it, so far apart that their names do not meet.
-
-    Examples
-    --------
-    >>> _ticks(1.0, 250.0)
-    [-100.0, -10.0, -1.0, 0.0, 1.0, 10.0, 100.0]
-    """
-    decades = int(np.log10(largest / even))
-    step = max(1, -(-decades // 2))
-    powers = range(decades, -1 if decades < 4 else 0, -step)
-    beyond = sorted(even * 10.0**power for power in powers)
-    return [-one for one in beyond[::-1]] + [0.0, *beyond]
-
-
-def _percent(share: float) -> str:
-    """A share; one that is not all, or not none, is not called so.
-
-    Examples
-    --------
-    >>> _percent(1.0), _percent(0.9991), _percent(0.0004), _percent(0.0)
-    ('100 %', 'over 99 %', 'under 1 %', '0 %')
-    """
-    if 0 < share < 0.005:
-        return "under 1 %"
-    return "over 99 %" if 0.995 <= share < 1 else f"{100 * share:.0f} %"
-
-
-def _nearer(metres: float) -> str:
-    return f"{length(abs(metres))} {'nearer' if metres > 0 else 'farther'}" if metres else "as far off"
+def _times_of(followed: ManyTracks) -> Array:
+    """(N,) s since the first look, of the looks at which true places are known."""
+    times = np.array([scan.time for scan in followed.scans])
+    return np.asarray((times - times[0])[known_scans(followed)])

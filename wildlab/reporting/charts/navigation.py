@@ -51,7 +51,7 @@ def poses_between(
     return attitude, velocity
 
 
-def strips(sources: Mapping[str, Strips], title: str) -> Figure:
+def strips(sources: Mapping[str, Strips]) -> Figure:
     """Quantities over time, one strip each, one line for each source; jumps of angles are not joined.
 
     Parameters
@@ -60,14 +60,14 @@ def strips(sources: Mapping[str, Strips], title: str) -> Figure:
         By name of the source, which has its fixed colour; all have the same labels.
     """
     labels = list(next(iter(sources.values()))[1])
-    fig, axes = new_strips(len(labels), 1.5 * len(labels) + 0.1)
+    fig, axes = new_strips(len(labels), 1.2 * len(labels) + 1.4)
     # Of lines that lie on one another the first is the widest, so that each later one shows it.
     widths = np.linspace(1.0 + 0.9 * (len(sources) - 1), 1.0, len(sources))
     for ax, label in zip(axes, labels, strict=True):
         for width, (name, (times, quantities)) in zip(widths, sources.items(), strict=True):
             draw_line(ax, times, without_jumps(quantities[label]), colour(name), _named(name), width=width)
         ax.set_ylabel(label)
-    return finish(fig, title, "time (s)")
+    return finish(fig, "time (s)")
 
 
 def mark_period(fig: Figure, period: tuple[float, float] | None) -> None:
@@ -84,7 +84,6 @@ def error_bands(
     errors: Mapping[str, ArrayLike],
     bounds: Mapping[str, ArrayLike],
     labels: Sequence[str],
-    title: str,
     largest: float | None = None,
 ) -> Figure:
     """Errors over time, one strip for each axis and one line for each source, within two standard deviations.
@@ -118,10 +117,10 @@ def error_bands(
         if reach > 0:
             ax.set_ylim(*(np.array([-1.05, 1.05]) * min(reach, largest or reach)))
         ax.set_ylabel(label)
-    return finish(fig, title, "time (s)")
+    return finish(fig, "time (s)")
 
 
-def bias_chart(times: ArrayLike, biases: ArrayLike, sd: ArrayLike, title: str) -> Figure:
+def bias_chart(times: ArrayLike, biases: ArrayLike, sd: ArrayLike) -> Figure:
     """Biases (K, 6) that a filter estimates, accelerometers (mm/s^2) and gyros (deg/h), within two
     standard deviations."""
     fig, axes = new_strips(2, 4.4)
@@ -135,12 +134,10 @@ def bias_chart(times: ArrayLike, biases: ArrayLike, sd: ArrayLike, title: str) -
         late = (np.abs(b) + two)[len(b) // 10 :, part]
         ax.set_ylim(*(np.array([-1.1, 1.1]) * float(np.nanmax(late, initial=0.0))))
         ax.set_ylabel(label)
-    return finish(fig, title, "time (s)")
+    return finish(fig, "time (s)")
 
 
-def squares_chart(
-    series: Mapping[str, tuple[ArrayLike, ArrayLike]], dof: int, what: str, title: str
-) -> Figure:
+def squares_chart(series: Mapping[str, tuple[ArrayLike, ArrayLike]], dof: int, what: str) -> Figure:
     """NIS or NEES over time on log axes, a strip for each series, with the 95 % band of single values.
 
     ``series`` has times and values by name.
@@ -153,31 +150,12 @@ def squares_chart(
         log_band(ax, low, high)
         lowest, highest = np.nanquantile(v, [0.005, 0.999])
         ax.set_ylim(min(low / 3, float(lowest)), max(high * 3, float(highest)))
-        ax.set_ylabel(f"{what}\n{_short(name)}")
-    return finish(fig, title, "time (s)")
-
-
-def speed_chart(sources: Mapping[str, tuple[ArrayLike, ArrayLike]], title: str) -> Figure:
-    """Speed over ground by source: times (s) and velocities (N, 3)."""
-    fig, (ax,) = new_strips(1, 3.0)
-    for name, (times, velocity) in sources.items():
-        speed = np.linalg.norm(np.asarray(velocity, float), axis=1)
-        draw_line(ax, times, speed, colour(name), _named(name), width=1.0)
-    ax.set_ylim(0, None)
-    return finish(fig, title, "time (s)", "speed over ground (m/s)")
-
-
-def velocities_of(nav: pd.DataFrame) -> tuple[Array, Array]:
-    """Times and velocities (N, 3) of a nav table, for `speed_chart`."""
-    return nav["time_s"].to_numpy(float), nav[["v_north_m_s", "v_east_m_s", "v_down_m_s"]].to_numpy(float)
+        ax.set_ylabel(f"{what}\n{name}")
+    return finish(fig, "time (s)")
 
 
 def _named(source: str) -> str:
     return NAMES.get(source, source)
-
-
-def _short(source: str) -> str:
-    return source.replace("second position", "2nd antenna")
 
 
 def _spread(values: Array) -> float:

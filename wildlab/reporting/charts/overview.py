@@ -12,12 +12,12 @@ from numpy.typing import ArrayLike
 
 from wildlab.analysis.image_coverage import Coverage
 from wildlab.analysis.overview import TROUBLES, Issue, Path
-from wildlab.evaluation.streams import FINE, HARMFUL, Pace, Vibration
+from wildlab.evaluation.streams import FINE, HARMFUL, Pace
 from wildlab.names import figure_name
 from wildlab.reporting.charts.drawing import (
     LINES,
     Array,
-    draw_band,
+    draw_cells,
     draw_line,
     draw_way,
     finish,
@@ -66,7 +66,7 @@ class Clock:
         return np.asarray((np.asarray(times, float) - self.begin) / self.unit)
 
 
-def path_chart(path: Path, troubles: Sequence[Issue], title: str) -> Figure:
+def path_chart(path: Path, troubles: Sequence[Issue]) -> Figure:
     """The path in local metres, coloured by what is wrong, worst on top."""
     fig, ax = new_figure(4.7, 5.0)
     dots = len(path.place) < 3 or not path.timed
@@ -96,7 +96,7 @@ def path_chart(path: Path, troubles: Sequence[Issue], title: str) -> Figure:
     ax.update_datalim([middle - reach, middle + reach])
     ax.autoscale_view()
     map_axes(ax)
-    return finish(fig, title)
+    return finish(fig)
 
 
 def path_name(path: Path) -> str:
@@ -118,30 +118,27 @@ def _piece(path: Path, begin: float, end: float) -> Array:
     return _place(path, np.unique([*ends, *inside[:: max(1, len(inside) // 500)]]))
 
 
-def coverage_chart(coverage: Coverage, path: Path | None, title: str) -> Figure:
+def coverage_chart(coverage: Coverage, path: Path | None) -> Figure:
     """How many images show each place, in local metres."""
     fig, ax = new_figure(4.7, 5.0)
-    sides = np.array(coverage.counts.shape)[::-1]
-    low = np.array([coverage.east, coverage.north]) - coverage.step / 2
-    high = low + sides * coverage.step
     norm = BoundaryNorm([*LOOKS, max(100, int(coverage.counts.max()) + 1)], len(SHADES))
-    picture = ax.imshow(
-        np.ma.masked_equal(coverage.counts, 0), origin="lower", extent=(low[0], high[0], low[1], high[1]),
-        cmap=ListedColormap(SHADES), norm=norm, interpolation="nearest",
-    )  # fmt: skip
+    counts, corner = np.ma.masked_equal(coverage.counts, 0), (coverage.east, coverage.north)
+    picture = draw_cells(ax, counts, *corner, coverage.step, cmap=ListedColormap(SHADES), norm=norm)
     if path is not None:
         # What was seen is shown, not the whole way there.
         place = path.place[thinned(len(path.place))][:, :2].copy()
-        place[((place[:, ::-1] < low) | (place[:, ::-1] > high)).any(axis=1)] = np.nan
+        left, right, low, high = picture.get_extent()
+        outside = (place < [low, left]) | (place > [high, right])
+        place[outside.any(axis=1)] = np.nan
         draw_way(ax, place, INK, width=0.7, alpha=0.8)
     bar = fig.colorbar(picture, ax=ax, shrink=0.8, ticks=LOOKS)
     bar.ax.set_yticklabels([f"{low}" if low < LOOKS[-1] else f"{low} +" for low in LOOKS])
     bar.set_label("images that show a place")
     map_axes(ax)
-    return finish(fig, title)
+    return finish(fig)
 
 
-def streams_chart(streams: Mapping[str, Pace], clock: Clock, title: str) -> Figure:
+def streams_chart(streams: Mapping[str, Pace], clock: Clock) -> Figure:
     """When each stream gave samples, and its pauses."""
     named = {name: pace for name, pace in streams.items() if pace.n}
     fig, ax = new_figure(5.9, 0.9 + 0.34 * len(named))
@@ -153,14 +150,13 @@ def streams_chart(streams: Mapping[str, Pace], clock: Clock, title: str) -> Figu
             # Also where the pause is too short to be seen.
             ax.plot(clock(gap).mean(), row, "|", color=VERMILLION, ms=12, mew=1.6)
     name_rows(ax, list(named))
-    return finish(fig, title, clock.label)
+    return finish(fig, clock.label)
 
 
 def lines_chart(
     series: Series,
     clock: Clock,
     label: str,
-    title: str,
     *,
     ground: tuple[Array, Array] | None = None,
     floor: bool = False,
@@ -173,10 +169,10 @@ def lines_chart(
         draw_line(ax, clock(series[name][0]), series[name][1], name=name, **look)
     if floor:
         ax.set_ylim(0, None)
-    return finish(fig, title, clock.label, label)
+    return finish(fig, clock.label, label)
 
 
-def attitude_chart(series: Series, clock: Clock, title: str) -> Figure:
+def attitude_chart(series: Series, clock: Clock) -> Figure:
     """Roll, pitch and yaw over time, a strip each; jumps at 180 degrees are not joined."""
     fig, axes = new_strips(3, 4.8, 4.6)
     for row, (ax, axis) in enumerate(zip(axes, ("roll (°)", "pitch (°)", "yaw (°)"), strict=True)):
@@ -184,7 +180,7 @@ def attitude_chart(series: Series, clock: Clock, title: str) -> Figure:
             times, angles = series[name]
             draw_line(ax, clock(times), without_jumps(angles[:, row]), name=name, **look)
         ax.set_ylabel(axis)
-    return finish(fig, title, clock.label)
+    return finish(fig, clock.label)
 
 
 def _looks(series: Mapping[str, object]) -> dict[str, dict[str, Any]]:
@@ -202,22 +198,13 @@ def _looks(series: Mapping[str, object]) -> dict[str, dict[str, Any]]:
     }
 
 
-def turning_chart(times: Array, rates: Array, clock: Clock, title: str) -> Figure:
-    """Angular rates (N, 3) in degrees a second over time."""
-    fig, ax = new_figure(4.6, 4.8)
-    at, low, high = _envelope(times, rates)
-    for axis, color in zip(range(3), LINES, strict=False):
-        draw_band(ax, clock(at), low[:, axis], high[:, axis], color, "xyz"[axis], alpha=0.6, lw=0.4, zorder=1)
-    return finish(fig, title, clock.label, "turning about each axis (°/s)")
-
-
 def _envelope(times: Array, values: Array) -> tuple[Array, Array, Array]:
     """Least and greatest (C, K) of bins of equal numbers of samples: nothing short is thinned away."""
     edges = np.unique(np.linspace(0, len(times), min(COLUMNS, len(times)) + 1).astype(int))[:-1]
     return times[edges], np.minimum.reduceat(values, edges), np.maximum.reduceat(values, edges)
 
 
-def satellites_chart(satellites: tuple[Array, Array] | None, sd: Series, clock: Clock, title: str) -> Figure:
+def satellites_chart(satellites: tuple[Array, Array] | None, sd: Series, clock: Clock) -> Figure:
     """How many satellites, and how uncertain the positions are said to be, over time."""
     count = (satellites is not None) + bool(sd)
     fig, axes = new_strips(count, 1.6 + 1.5 * count)
@@ -228,29 +215,19 @@ def satellites_chart(satellites: tuple[Array, Array] | None, sd: Series, clock: 
         for (name, (times, values)), color in zip(sd.items(), LINES, strict=False):
             draw_line(axes[-1], clock(times), values, color, name)
         axes[-1].set(ylabel="stated SD (m)", ylim=(0, None))
-    return finish(fig, title, clock.label)
+    return finish(fig, clock.label)
 
 
-def bands_chart(found: Vibration, title: str) -> Figure:
-    """Shaking by band of frequency, a bar for each axis."""
-    fig, ax = new_figure(4.6, 3.5)
-    place = np.arange(len(found.bands))
-    for axis, color in zip(range(3), LINES, strict=False):
-        ax.bar(place + 0.26 * (axis - 1), found.rms[:, axis], 0.24, color=color, label="xyz"[axis])
-    ax.set_xticks(place, [f"{low:g}–\n{high:g}" for low, high in np.round(found.bands)])
-    return finish(fig, title, "band (Hz)", "root mean square (m/s²)")
-
-
-def shaking_chart(found: Vibration, times: Array, clock: Clock, title: str) -> Figure:
+def shaking_chart(level: Array, times: Array, clock: Clock) -> Figure:
     """Shaking of each axis over time by the measure of the limits, with these where they are in reach."""
     fig, ax = new_figure(4.6, 3.5)
-    at, _, high = _envelope(times, found.level)
+    at, _, high = _envelope(times, level)
     for axis, color in zip(range(3), LINES, strict=False):
         draw_line(ax, clock(at), high[:, axis], color, "xyz"[axis])
-    top = 1.1 * float(found.level.max())
+    top = 1.1 * float(level.max())
     for limit, words in ((FINE, "may harm"), (HARMFUL, "nearly always harms")):
         if limit < 1.5 * top:
             mark_level(ax, limit, f"{words}, above {limit:g}")
             top = max(top, 1.15 * limit)
     ax.set_ylim(0, top)
-    return finish(fig, title, clock.label, "shaking above 5 Hz (m/s²)")
+    return finish(fig, clock.label, "shaking above 5 Hz (m/s²)")

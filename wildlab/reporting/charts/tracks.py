@@ -1,4 +1,4 @@
-"""Charts of one target's tracks beside its truth: map, errors, speed and course, consistency, innovations.
+"""Charts of positions and of one target's tracks beside its truth: map, errors, course, consistency.
 
 Tracks are given by their subject, which has its fixed colour (`wildlab.reporting.figures.COLOURS`), in the
 order in which they are drawn; ``names`` says what each is called in the legend. Times, (N,), are seconds
@@ -13,25 +13,44 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogFormatter
+from matplotlib.ticker import FuncFormatter, LogFormatter, MaxNLocator
 from numpy.typing import ArrayLike
 
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.evaluation.errors import SLOWEST_M_S
+from wildlab.geometry.covariances import chi2_quantile
+from wildlab.names import figure_name
 from wildlab.reporting.charts.drawing import (
+    DASHED,
     TRUTH,
     Array,
+    draw_band,
     draw_dots,
     draw_line,
     draw_way,
-    draw_white_band,
     finish,
     mark_place,
     name_rows,
     new_strips,
+    spread_points,
     without_jumps,
 )
-from wildlab.reporting.figures import GREEN, GREY, INK, colour, log_band, map_axes, mark_gaps, new_figure
+from wildlab.reporting.figures import (
+    BLUE,
+    GREEN,
+    GREY,
+    INK,
+    ORANGE,
+    VERMILLION,
+    colour,
+    ellipse,
+    end_label,
+    log_band,
+    map_axes,
+    mark_gaps,
+    new_figure,
+    plain_numbers,
+)
 
 #: A pause in the detections longer than this (seconds) is shaded.
 GAP_S = 2.0
@@ -48,7 +67,6 @@ def track_map(
     truth: ArrayLike,
     tracks: Mapping[str, ArrayLike],
     names: Mapping[str, str],
-    title: str,
     *,
     measured: ArrayLike | None = None,
     aircraft: ArrayLike | None = None,
@@ -75,7 +93,7 @@ def track_map(
     ax.plot(start[1], start[0], "o", color=colour("truth"), ms=5)
     mark_place(ax, start, "start", below=bool(end[0] > start[0] or start[0] > high - 0.1 * (high - low)))
     map_axes(ax)
-    return finish(fig, title)
+    return finish(fig)
 
 
 def error_over_time(
@@ -83,7 +101,6 @@ def error_over_time(
     seen: ArrayLike,
     errors: Mapping[str, ArrayLike],
     names: Mapping[str, str],
-    title: str,
     *,
     measured: ArrayLike | None = None,
 ) -> Figure:
@@ -114,7 +131,7 @@ def error_over_time(
         ax.set_ylim(bottom - 0.06 * (top - bottom), top)
         ax.plot(there, np.full(len(there), 0.025), "|", color=INK, ms=6, alpha=0.35,
                 transform=ax.get_xaxis_transform())  # fmt: skip
-    return finish(fig, title, _SINCE)
+    return finish(fig, _SINCE)
 
 
 def speed_and_course(
@@ -123,7 +140,6 @@ def speed_and_course(
     truth: ArrayLike,
     tracks: Mapping[str, ArrayLike],
     names: Mapping[str, str],
-    title: str,
 ) -> Figure:
     """Speed and course of tracks and of the truth, all (N, 4): north, east, and their rates.
 
@@ -150,7 +166,7 @@ def speed_and_course(
         course.set_yticks([0, 90, 180, 270, 360])
     else:
         course.yaxis.set_major_formatter(FuncFormatter(lambda angle, _: f"{angle % 360:g}"))
-    return finish(fig, title, _SINCE, "speed (m/s)")
+    return finish(fig, _SINCE, "speed (m/s)")
 
 
 def course_of(states: ArrayLike) -> Array:
@@ -176,7 +192,6 @@ def squares_over_time(
     seen: ArrayLike,
     values: Mapping[str, Mapping[str, ArrayLike]],
     names: Mapping[str, str],
-    title: str,
 ) -> Figure:
     """NEES or NIS (N,) of tracks on log axes, with the 95 % band of single values; pauses are shaded.
 
@@ -203,7 +218,7 @@ def squares_over_time(
         log_band(ax, low, high)
         mark_gaps(ax, t[there], GAP_S)
         ax.set(ylim=(low / 12, 2 * highest), ylabel=what)
-    return finish(fig, title, _SINCE)
+    return finish(fig, _SINCE)
 
 
 def values_over_flights(
@@ -234,43 +249,22 @@ def values_over_flights(
     for place, name in enumerate(names):
         row = np.sort(values[name].to_numpy(float))
         color = colour(name.split("-")[0])
-        # Spread out by rank, in a pattern that repeats, so that equal values do not hide one another.
-        offset = 0.28 * (2 * ((np.arange(len(row)) * 0.618034) % 1) - 1)
-        draw_dots(ax, row, place + offset, color, size=4.5 if len(values) > FEW else 9.0, alpha=0.4)
+        draw_dots(
+            ax,
+            row,
+            place + spread_points(len(row), 0.28),
+            color,
+            size=4.5 if len(values) > FEW else 9.0,
+            alpha=0.4,
+        )
         ax.plot([np.median(row)] * 2, [place - 0.36, place + 0.36], color=INK, lw=1.6)
         if name in published:
             ax.plot(published[name], place, "D", mfc="white", mec=INK, ms=8, mew=1.6, zorder=5)
     ax.set_xscale("log")
-    ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    plain_numbers(ax.xaxis)
     ax.xaxis.set_minor_formatter(LogFormatter(labelOnlyBase=False))
     name_rows(ax, list(names.values()))
-    return finish(fig, "", label)
-
-
-def innovation_correlations(
-    series: Mapping[str, ArrayLike],
-    bound: float,
-    names: Mapping[str, str],
-    title: str,
-    axes: tuple[str, ...] = ("north", "east"),
-) -> Figure:
-    """Autocorrelations (m, lags + 1) of innovations, one strip for each of the m elements.
-
-    Parameters
-    ----------
-    bound
-        What white noise stays below.
-    axes
-        What the elements are called.
-    """
-    fig, strips = new_strips(len(axes), 2.1 * len(axes) + 0.6)
-    for i, (ax, name) in enumerate(zip(strips, axes, strict=True)):
-        draw_white_band(ax, bound)
-        for subject, r, look in _looks(series, names):
-            y = np.asarray(r, float)[i]
-            draw_line(ax, np.arange(len(y)), y, colour(subject), **look)
-        ax.set_ylabel(f"autocorrelation,\n{name}")
-    return finish(fig, title, "lag (detections)")
+    return finish(fig, label)
 
 
 def _looks(series: Mapping[str, Any], names: Mapping[str, str]) -> list[tuple[str, Any, dict[str, Any]]]:
@@ -285,3 +279,115 @@ def _columns(values: ArrayLike) -> Array:
     """(N,) as (N, 1); (N, 2) stays."""
     array = np.asarray(values, float)
     return array.reshape(len(array), -1)
+
+
+def error_scatter(errors: ArrayLike, color: str = BLUE, reach: float | None = None) -> Figure:
+    """Errors (N, 2) north-east about the truth, with the ellipse that holds 90 % of a normal distribution.
+
+    ``reach`` is the half width of the map in metres, for figures that are to be compared.
+    """
+    e = _finite(errors)
+    fig, ax = new_figure(4.6, 4.4)
+    far = np.abs(e).max(initial=0.0)
+    draw_dots(ax, e[:, 1], e[:, 0], color, size=6)
+    if len(e) > 2:
+        ellipse(ax, e.mean(axis=0)[::-1], np.cov(e[:, ::-1].T), color=color)
+        half = np.sqrt(e.var(axis=0, ddof=1) * chi2_quantile(0.9, 2))
+        far = max(far, float((np.abs(e.mean(axis=0)) + half).max()))
+    reach = reach or max(1.0, 1.1 * float(far))
+    ax.plot(*e.mean(axis=0)[::-1], "o", mfc="white", mec=color, ms=7, mew=1.6)
+    north, east = e.mean(axis=0) if len(e) else (0.0, 0.0)
+    # Its name stands away from what lies north and east of it.
+    ax.plot(0, 0, "+", color=colour("truth"), ms=13, mew=2)
+    mark_place(ax, (0.0, 0.0), "truth", below=bool(north >= 0), aside=-8 if east > 0 else 8)
+    ax.set(xlim=(-reach, reach), ylim=(-reach, reach))
+    map_axes(ax, east="error, east (m)", north="error, north (m)")
+    return finish(fig)
+
+
+def error_shares(series: Mapping[str, tuple[ArrayLike, str]]) -> Figure:
+    """Share of points within a distance, one line for each series of errors (N, 2), with its colour."""
+    fig, ax = new_figure(4.6, 4.4)
+    ax.axhline(90, color=GREY, **DASHED)
+    distances = {name: np.sort(np.hypot(*_finite(errors).T)) for name, (errors, _) in series.items()}
+    for name, distance in distances.items():
+        share = 100 * np.arange(1, len(distance) + 1) / len(distance)
+        ax.step(distance, share, where="post", color=series[name][1], label=figure_name(name))
+    ax.set(xlim=(0, 1.02 * max(float(one[-1]) for one in distances.values())), ylim=(0, 102))
+    return finish(fig, "distance from the truth (m)", "points within that distance (%)")
+
+
+def errors_by_image(scored: pd.DataFrame) -> Figure:
+    """Distance of every point from the truth by image in order of time, with each image's mean."""
+    order = scored.groupby("frame_id", sort=False)["time_s"].first().sort_values(kind="stable").index
+    place = scored["frame_id"].map({name: i for i, name in enumerate(order)})
+    mean = scored.groupby(place)["error_m"].mean()
+    fig, ax = new_figure(5.9, 3.0)
+    draw_dots(ax, place, scored["error_m"], BLUE, "point", size=6)
+    draw_line(ax, mean.index, mean, VERMILLION, "mean of an image")
+    ax.set_ylim(0, None)
+    ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+    return finish(fig, "image, in order", "error (m)")
+
+
+def aircraft_map(aircraft: ArrayLike, seeing: ArrayLike, target: ArrayLike, name: str = "vessel") -> Figure:
+    """Paths of aircraft (N, 2) and target (M, 2), north and east, and from where it was seen (K, 2)."""
+    path, seen, below = (np.asarray(a, float) for a in (aircraft, seeing, target))
+    fig, ax = new_figure(5.2, 4.6)
+    draw_way(ax, path, GREY, width=0.9)
+    draw_dots(ax, seen[:, 1], seen[:, 0], ORANGE, size=2, alpha=1.0)
+    draw_way(ax, below, colour("truth"), width=2.2, marker="+" if len(below) == 1 else "", ms=13, mew=2)
+    # Towards the middle of the map, away from title and axis.
+    north = np.concatenate([one[:, 0] for one in (path, seen, below)])
+    high = bool(below[-1, 0] > (np.nanmin(north) + np.nanmax(north)) / 2)
+    mark_place(ax, below[-1], name, below=high, aside=6)
+    map_axes(ax)
+    return finish(fig)
+
+
+def positions_map(
+    points: ArrayLike,
+    reference: ArrayLike,
+    color: str,
+    bounds: tuple[ArrayLike, ArrayLike] | None = None,
+) -> Figure:
+    """Georeferenced positions (N, 2) and the target's path (M, 2), north and east.
+
+    ``bounds`` are the lowest and highest north and east of the map, for figures that are to be compared.
+    """
+    xy = np.asarray(points, float)
+    fig, ax = new_figure(4.6, 4.6)
+    draw_dots(ax, xy[:, 1], xy[:, 0], color, zorder=3)
+    draw_way(ax, reference, colour("truth"))
+    if bounds is not None:
+        low, high = (np.asarray(b, float) for b in bounds)
+        ax.set(xlim=(low[1], high[1]), ylim=(low[0], high[0]))
+    map_axes(ax)
+    return finish(fig)
+
+
+def errors_over_time(
+    times: ArrayLike, measured: ArrayLike, estimated: ArrayLike, xlabel: str,
+    stated: ArrayLike | None = None, reach: float | None = None,
+) -> Figure:  # fmt: skip
+    """Distances from the truth (T,) of single images and of the estimate, over times or numbers.
+
+    ``stated`` is what the filter states, from zero on; ``reach`` is the top of the axis in metres, for
+    figures that are to be compared.
+    """
+    t, raw, estimate = (np.array(a, float) for a in (times, measured, estimated))
+    fig, ax = new_figure(5.9, 3.5)
+    draw_dots(ax, t, raw, GREY, size=3)
+    draw_line(ax, t, estimate, BLUE, width=1.5)
+    if stated is not None:
+        draw_band(ax, t, 0 * t, stated, BLUE)
+    known = np.isfinite(estimate)
+    end_label(ax, t[-1], float(estimate[known][-1]), "filtered", BLUE)
+    end_label(ax, t[-1], float(np.nanmedian(raw)), "single\nimages", GREY)
+    ax.set_ylim(0, reach or 1.05 * float(np.nanmax([raw, estimate])))
+    return finish(fig, xlabel, "error (m)")
+
+
+def _finite(errors: ArrayLike) -> Array:
+    e = np.asarray(errors, float).reshape(-1, 2)
+    return np.asarray(e[np.isfinite(e).all(axis=1)])

@@ -28,7 +28,7 @@ from wildlab.reporting.notebook_pages import (
     step_of,
     write_notebook,
 )
-from wildlab.reporting.page import failure_page
+from wildlab.reporting.text import failure_page
 from wildlab.runner.record.digests import seal
 from wildlab.runner.seeds import SeedWork
 
@@ -153,7 +153,6 @@ FILES = (
     "provenance.json",
     "notebook.ipynb",
     "replay.html",
-    "replay.rrd",
     "estimates.parquet",
     "estimates.csv",
 )
@@ -173,7 +172,7 @@ def leave_failure(job: Job, failure: Failure, cell: int | None, status: dict[str
             step = step or step_of(notebook, cell)
         except WildlabError:
             executed.unlink()
-    for name in ("metrics.json", "replay.html", "replay.rrd", "estimates.parquet", "estimates.csv"):
+    for name in ("metrics.json", "replay.html", "estimates.parquet", "estimates.csv"):
         (folder / name).unlink(missing_ok=True)
     clear_folder(folder / "figures")
     beside = [name for name in ("provenance.json", "notebook.ipynb") if (folder / name).is_file()]

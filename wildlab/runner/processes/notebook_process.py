@@ -90,8 +90,8 @@ def _keep_to_ourselves(job: Job) -> None:
 def _work(pipe: connection.Connection, job: Job) -> None:
     from wildlab.files import write_atomic, write_json
     from wildlab.reporting import metrics, notebook_pages
-    from wildlab.reporting.page import first_look_notice
     from wildlab.reporting.status import describe_first_look
+    from wildlab.reporting.text import first_look_notice
     from wildlab.runner.catalogue import OTHERS
     from wildlab.runner.record import provenance
 

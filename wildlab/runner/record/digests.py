@@ -15,7 +15,7 @@ STATUS = "status.json"
 #: Of ``status.json``: the digests of the other files by name, and that of all else that it says.
 FILES, OWN = "files", "digest"
 #: What a run leaves and others put there later, too.
-_LATER = frozenset({"replay.html", "replay.rrd"})
+_LATER = frozenset({"replay.html"})
 AGAIN = "make the report again, or take the file from a copy of it"
 #: What is said of a report that was written before there were digests.
 BEFORE_DIGESTS = "made before digests; run again"

@@ -8,20 +8,19 @@ from pathlib import Path
 from wildlab.files import write_atomic
 from wildlab.paths import NOTEBOOKS, REPORTS, ROOT
 from wildlab.reporting.front_page import (
+    LEDGER,
     MOST_FLIGHTS,
     PARTNERS,
     Learn,
     case_cards,
     flight_card,
     front_page,
-    load_front_flight,
+    ledger_page,
     partners_page,
     read_glimpse,
 )
-from wildlab.reporting.ledger import ledger_page
 from wildlab.reporting.notebook_pages import read_notebook
 from wildlab.reporting.own_flights import PAGE, flights_page
-from wildlab.reporting.published_marks import LEDGER
 from wildlab.reporting.status import load_cases
 from wildlab.reporting.text import escape
 from wildlab.runner.catalogue import StudyEntry
@@ -54,7 +53,6 @@ def build_ledger(reports: Path, studies: Mapping[str, StudyEntry]) -> Path:
     path = reports / "index.html"
     whole = front_page(
         statuses,
-        load_front_flight(),
         study_cards=case_cards(
             (
                 (one, read_glimpse(reports / one.study.name / "report.html"))
