@@ -35,8 +35,8 @@ def report_of(flight: Path, place: Path) -> Path:
 
 def test_a_flight_is_written(flight, tmp_path):
     out = succeed("replay", flight, "--out", tmp_path / "out", *POSES)
-    assert out.split() == [str(tmp_path / "out" / "replay.html")]
-    assert [one.name for one in (tmp_path / "out").iterdir()] == ["replay.html"]
+    assert out.split() == [str(tmp_path / "out" / name) for name in ("replay.html", "replay.rrd")]
+    assert sorted(one.name for one in (tmp_path / "out").iterdir()) == ["replay.html", "replay.rrd"]
     assert not list(flight.glob("replay.*"))
 
 

@@ -198,7 +198,7 @@ def track(
 def replay(folder: Path, images: Path | None, source: str | None, out: Path | None) -> None:
     """Play DIR back, a flight or a report made from one.
 
-    Writes replay.html, for any browser. It shows the aircraft, what its
+    Writes replay.html, for any browser, and replay.rrd, for rerun's viewer. They show the aircraft, what its
     camera saw of the ground, the images, what was detected, tracks with their 90 % ellipses where wildlab
     track left some, the truth, and errors and NEES over time. What the flight lacks is said. Everything is in
     metres from an origin that is not told, and in seconds from the first pose; images are reduced, and
@@ -209,10 +209,12 @@ def replay(folder: Path, images: Path | None, source: str | None, out: Path | No
       wildlab replay flights/tuesday
       wildlab replay flights/tuesday --images card/DCIM
       wildlab replay reports/tuesday-tracking
+      rerun reports/tuesday-replay/replay.rrd       the viewer as a program
     """
     from wildlab.runner.replay import replay as write_replay
 
     written, scene = write_replay(folder, into=out, images=images, source=source, console=terminal_console())
     for clause in scene.lacks:
         click.echo(stopped(f"Not shown: {clause}"), err=True)
-    click.echo(shown(written))
+    for path in written:
+        click.echo(shown(path))

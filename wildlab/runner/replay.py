@@ -20,11 +20,12 @@ from wildlab.flight.store import Flight, load_flight
 from wildlab.paths import REPORTS
 from wildlab.replay.images import read_shots
 from wildlab.replay.page import page
+from wildlab.replay.recording import save_recording
 from wildlab.replay.scene import ReplayScene, scene_of
 from wildlab.runner.evaluate import tell_source
 from wildlab.runner.record.provenance import flight_of_report, provenance_of_flight, read_provenance
 
-PAGE, ESTIMATES = "replay.html", "estimates.parquet"
+PAGE, RECORDING, ESTIMATES = "replay.html", "replay.rrd", "estimates.parquet"
 
 
 def replay(
@@ -35,8 +36,8 @@ def replay(
     source: str | None = None,
     reports: Path = REPORTS,
     console: Console | None = None,
-) -> tuple[Path, ReplayScene]:
-    """Write the replay of a flight, a page.
+) -> tuple[list[Path], ReplayScene]:
+    """Write the replay of a flight: a page, and a recording for rerun's viewer.
 
     Parameters
     ----------
@@ -55,8 +56,8 @@ def replay(
 
     Returns
     -------
-    file, scene
-        The page, and what it shows.
+    files, scene
+        What was written, and what it shows.
 
     Raises
     ------
@@ -80,8 +81,10 @@ def replay(
                 field="--out",
             )
         target.mkdir(parents=True, exist_ok=True)
+        tell("writing", None, None)
         write_atomic(target / PAGE, page(scene, shots))
-    return target / PAGE, scene
+        save_recording(scene, target / RECORDING, shots)
+    return [target / PAGE, target / RECORDING], scene
 
 
 def _with_images(

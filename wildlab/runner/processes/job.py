@@ -153,6 +153,7 @@ FILES = (
     "provenance.json",
     "notebook.ipynb",
     "replay.html",
+    "replay.rrd",
     "estimates.parquet",
     "estimates.csv",
 )
@@ -172,7 +173,7 @@ def leave_failure(job: Job, failure: Failure, cell: int | None, status: dict[str
             step = step or step_of(notebook, cell)
         except WildlabError:
             executed.unlink()
-    for name in ("metrics.json", "replay.html", "estimates.parquet", "estimates.csv"):
+    for name in ("metrics.json", "replay.html", "replay.rrd", "estimates.parquet", "estimates.csv"):
         (folder / name).unlink(missing_ok=True)
     clear_folder(folder / "figures")
     beside = [name for name in ("provenance.json", "notebook.ipynb") if (folder / name).is_file()]
