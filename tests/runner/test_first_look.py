@@ -178,13 +178,20 @@ def test_a_first_look_alone(studies):
     assert "first look" not in studies.ledger().partition('id="other"')[2].partition("</section>")[0]
 
 
-def test_the_ledger_is_there_before_anything_and_after_each_study(studies):
+def test_the_ledger_is_there_before_anything_and_after_each_study_that_takes_a_while(studies, monkeypatch):
+    monkeypatch.setattr(running, "LEDGER_EVERY_S", -1.0)
     studies.run(everything=True)
     assert [text.count("not run yet") for text in studies.ledgers] == [3, 2, 1, 0, 0]
     # The words stand on the page itself and in the tile that counts them.
     looks = [text.count('class="look"') for text in [*studies.ledgers, studies.ledger()]]
     assert looks == [0, 0, 1, 2, 1, 0]
     assert "2 of 9 runs" in studies.ledgers[2] and "1 / 3</b>" in studies.ledgers[2]
+    assert "3 / 3</b>" in studies.ledger()
+
+
+def test_of_quick_studies_the_ledger_is_written_at_the_end(studies):
+    studies.run(everything=True)
+    assert [text.count("not run yet") for text in studies.ledgers] == [3] * 5
     assert "3 / 3</b>" in studies.ledger()
 
 
