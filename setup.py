@@ -11,7 +11,7 @@ from setuptools.command.build_py import build_py
 
 FOLDERS = ("notebooks", "data")
 #: A working copy also holds tables and pictures that somebody left there; these kinds alone are wildlab's.
-KINDS = {".ipynb", ".json", ".toml", ".md", ".css", ".html", ".js", ".mplstyle", ".sql"}
+KINDS = {".ipynb", ".json", ".toml", ".md", ".css", ".html", ".js", ".mplstyle", ".sql", ".svg"}
 
 
 def resources() -> list[Path]:

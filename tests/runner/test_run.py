@@ -29,7 +29,6 @@ SHOW = (
     "ax.plot(values)\n"
     'report.section("Figures")\n'
     'report.figure(fig, name="fig-1", alt="A line.", caption="A line.")\n'
-    'report.math("x_k")\n'
     'report.metric("mean", "all", values.mean(), "m", n=runs)\n'
     "report.save()"
 )
