@@ -162,6 +162,21 @@ def test_kml_gives_the_same_as_geojson(tmp_path):
         assert np.allclose(one.outline, other.outline, atol=1e-6)
 
 
+@pytest.mark.parametrize("ending", [",", "", ",,"])
+def test_heights_may_be_missing_and_rings_in_any_order(ending, tmp_path):
+    """Near 45 N 45 E nothing but the count of numbers tells longitudes from latitudes."""
+    hole = [[20, 20], [20, 40], [40, 40], [40, 20], [20, 20]]
+    whole = placemark(SQUARE, hole)
+    bare = whole.replace(",0", ending)
+    outer, inner = bare.index("<outerBoundaryIs>"), bare.index("<innerBoundaryIs>")
+    end = bare.index("</Polygon>")
+    turned = bare[:outer] + bare[inner:end] + bare[outer:inner] + bare[end:]
+    for text in (bare, turned):
+        (one,), (same,) = (parse(kml(each), tmp_path).areas for each in (text, whole))
+        assert np.allclose(one.outline, same.outline) and len(one.holes) == 1
+        assert one.size == pytest.approx(same.size)
+
+
 BOMB = '<!DOCTYPE x [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;">]>'
 BAD_KML = {
     "KML cut off": (kml(placemark(SQUARE))[:-30], "is not KML"),

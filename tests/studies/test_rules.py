@@ -22,13 +22,14 @@ def test_rules_are_arithmetic_on_numbers():
     assert rules("sqrt('x') + twice ** 2 - three")[:2].tolist() == [2.0, 63.0]
     assert rules("1 < 'x' <= 4 and not finite('x') or 'x' == 1").tolist() == [True, False, False]
     assert rules("max('x', 2)").tolist()[:2] == [2.0, 4.0]
+    assert rules("10 ** 19") == 1e19 and rules("2 ** -1") == 0.5
 
 
 @pytest.mark.parametrize(
     "rule",
     [
         "__import__('os').system('true')", "open('x')", "'x'.real", "[1, 2]", "lambda: 1", "other", "1 +",
-        "max('x', key=1)", "(x := 1)", "'a' if 1 else 'b'", "1 << 2", "f'{1}'",
+        "max('x', key=1)", "min()", "white_bound(1e400)", "(x := 1)", "'a' if 1 else 'b'", "1 << 2", "f'{1}'",
     ],
 )  # fmt: skip
 def test_nothing_else_is_worked_out(rule):

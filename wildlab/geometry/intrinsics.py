@@ -226,7 +226,7 @@ def calibrate_camera(
         without[left] = _values(rest, names)
     apart = without - without.mean(axis=0)
     covariance = (len(uv) - 1) / len(uv) * apart.T @ apart
-    r = project_board(camera, views, board) - uv
+    r = np.where(seen[..., None], project_board(camera, views, board) - uv, np.nan)
     return Intrinsics(camera, names, values, covariance, views, r, information, without)
 
 

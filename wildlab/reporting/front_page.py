@@ -88,7 +88,7 @@ def read_glimpse(report: Path) -> Glimpse:
 
 @lru_cache(maxsize=512)
 def _read(report: Path, changed: int, size: int) -> Glimpse:
-    """Kept as long as the file is the same: the page is put together after each study of a run."""
+    """Kept as long as the file is the same: the page is put together several times in a run."""
     try:
         whole = report.read_text(encoding="utf-8")
     except (OSError, ValueError):

@@ -165,7 +165,7 @@ def run_studies(
     timeout_s: float | None = None,
     console: Console | None = None,
 ) -> list[Outcome]:
-    """Run studies by name or case, or all. The ledger is written first, and after each study.
+    """Run studies by name or case, or all. The ledger is written first, from time to time, and at the end.
 
     Parameters
     ----------

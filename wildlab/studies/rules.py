@@ -126,7 +126,7 @@ class Rules(NamedTuple):
         with np.errstate(invalid="ignore", divide="ignore"):
             try:
                 return self._of(_parsed(rule))
-            except (SyntaxError, TypeError, ValueError, RecursionError) as error:
+            except (SyntaxError, TypeError, ValueError, IndexError, OverflowError, RecursionError) as error:
                 fix = "write it as wildlab.studies.rules says"
                 raise WildlabError(f"the rule {rule!r} cannot be worked out ({error})", fix) from error
 
@@ -135,7 +135,7 @@ class Rules(NamedTuple):
             case ast.Constant(value=str(key)):
                 return self.number(key)
             case ast.Constant(value=int() | float() as value):
-                return value
+                return float(value)
             case ast.Name(id=name) if name in self.given:
                 return self(self.given[name])
             case ast.UnaryOp(op=op, operand=one) if type(op) in _OPERATORS:

@@ -68,7 +68,10 @@ OTHER_NAMES = (
 )
 
 
-@pytest.mark.parametrize("data", [COCO, CVAT, CORNERS, SIZES_CSV, OTHER_NAMES])
+SIZE_IN_WORDS = COCO.replace(b'"a.jpg"', b'"a.jpg", "width": "200", "height": null')
+
+
+@pytest.mark.parametrize("data", [COCO, SIZE_IN_WORDS, CVAT, CORNERS, SIZES_CSV, OTHER_NAMES])
 def test_boxes_out_of_every_format(data):
     assert clicks_sniff(data[:8192])
     check_boxes(read(HERE, data))

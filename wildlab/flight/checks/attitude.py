@@ -40,6 +40,7 @@ from wildlab.flight.checks.findings import (
     undo_in,
 )
 from wildlab.flight.checks.inertial import (
+    FACTOR,
     FORCE,
     RATE,
     Inertial,
@@ -183,8 +184,10 @@ def forces(flight: Flight) -> Iterator[Finding]:
         facts: dict[str, Any] = {"source": source, "turns": before[0], "forces": before[1]}
         if named:
             after = _felt_misfit(named[0].undone)[:, 0]
+            # Rates that are far too small leave no more than the turns.
+            slow = _rms(given.rate) * FACTOR < _rms(given.turned)
             yield blame(
-                "problem" if before.max() > UNEXPLAINED else "warning",
+                "problem" if before.max() > UNEXPLAINED or slow else "warning",
                 "imu" if all("[imu" in one.fix for one in named) else table,
                 "",
                 "felt-explained",

@@ -322,8 +322,8 @@ class Image(BaseModel, extra="allow"):
 
     id: Identity
     file_name: Name
-    width: Real | None = None
-    height: Real | None = None
+    width: float | str | None = None  # of no use but as numbers
+    height: float | str | None = None
 
 
 class Annotation(BaseModel):
@@ -442,15 +442,17 @@ def _truth(found: Truth, path: Path, group: str | None) -> Marked:
             rows.append((name, given.bbox, kind, given.score, bool(given.iscrowd)))
         elif kind.lower() not in EMPTY:
             unjudged.append(name)
+    left = set(unjudged)
     return Marked(
         "COCO",
         box_table(rows),
-        tuple(one for one in groups if one not in set(unjudged)),
+        tuple(one for one in groups if one not in left),
         tuple(dict.fromkeys(categories.values())),
         sizes={
             one.file_name: (int(one.width), int(one.height))
             for one in found.images
-            if one.width and one.height and min(one.width, one.height) >= 1
+            if isinstance(one.width, float) and isinstance(one.height, float)
+            if min(one.width, one.height) >= 1
         },
         ids=names,
         categories=categories,

@@ -83,8 +83,10 @@ def _kml(data: bytes, path: Path) -> tuple[list[Place], int]:
         name = (mark.findtext("name") or "")[:MOST_LETTERS]
         for kind in ("Point", "Polygon"):
             for one in mark.iter(kind):
-                rings = [_ring(each.text or "", path) for each in one.iter("coordinates")]
-                if not rings or not len(rings[0]):
+                holes = [each for hole in one.iter("innerBoundaryIs") for each in hole.iter("coordinates")]
+                outline = [each for each in one.iter("coordinates") if each not in holes][:1]
+                rings = [_ring(each.text or "", path) for each in (*outline, *holes)]
+                if not outline or not len(rings[0]):
                     raise WildlabError(f"a {kind} has no coordinates", "export it anew", file=path)
                 if (one.findtext("altitudeMode") or "").strip() != "absolute":
                     rings[0][:, 2] = np.nan
@@ -93,14 +95,18 @@ def _kml(data: bytes, path: Path) -> tuple[list[Place], int]:
 
 
 def _ring(words: str, path: Path) -> Array:
-    """(K, 3) of the text of an element ``coordinates``."""
-    try:
-        places = [[float(part) for part in f"{word},nan".split(",")[:3] if part] for word in words.split()]
-        return np.array(places, float).reshape(-1, 3)
-    except ValueError:
-        problem = f"{printable(words.strip()[:40])!r} is no coordinate"
-        fix = "give longitude,latitude without blanks"
-        raise WildlabError(problem, fix, file=path, field="coordinates") from None
+    """(K, 3) of the text of an element ``coordinates``; a height that is not there is NaN."""
+    places = []
+    for word in words.split():
+        parts = word.split(",")
+        try:
+            high = float(parts[2]) if len(parts) > 2 and parts[2] else math.nan
+            places.append((float(parts[0]), float(parts[1]), high))
+        except (ValueError, IndexError):
+            problem = f"{printable(word)[:40]!r} is no coordinate"
+            fix = "give longitude,latitude without blanks"
+            raise WildlabError(problem, fix, file=path, field="coordinates") from None
+    return np.array(places, float).reshape(-1, 3)
 
 
 # -- GeoJSON
