@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import pymap3d
 import pytest
 from scipy.spatial.transform import Rotation
 
-from wildlab.flight.checks.known_points import SightingGeometry, Sightings, judge
+from wildlab.flight.checks.known_points import SightingGeometry, Sightings, calibration_mistakes, judge
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
@@ -131,3 +132,10 @@ def test_a_mistake_is_named(make_flight, cause):
     flight = make_flight(time={"kind": "sequence"})
     found = [one.causes for one in judge(flight, MISTAKES[cause](sightings()))]
     assert any(cause in one for one in found), found
+
+
+@pytest.mark.parametrize(("focal", "named"), [(700.0, False), (0.7, True)])
+def test_no_focal_length_is_offered_that_no_lens_has(focal, named):
+    camera = Camera(1000, 800, focal, focal, 500.0, 400.0)
+    causes = {one.cause for one in calibration_mistakes(SimpleNamespace(camera=camera))}
+    assert ("focal length a thousand times" in causes) == named

@@ -592,13 +592,13 @@ def pixel_mistakes(s: Sightings) -> Iterator[Mistake[Sightings]]:
 
 
 def calibration_mistakes(s: Sightings) -> Iterator[Mistake[Sightings]]:
-    """Focal length, principal point, distortion."""
+    """Focal length (no lens shows as little as half a degree), principal point, distortion."""
     camera = s.camera
     numbers = (camera.fx, camera.fy, camera.cx, camera.cy, *camera.distortion)
     size = np.array([0, 0, camera.width, camera.height, 0, 0, 0, 0, 0])
     for row in rows_of("calibration"):
         right = change_by(row, size)(np.array(numbers))
-        if right is not None and tuple(right) != numbers:
+        if right is not None and tuple(right) != numbers and right[0] < 100 * camera.width:
             fx, fy, cx, cy, *distortion = right.tolist()
             changed = replace(camera, fx=fx, fy=fy, cx=cx, cy=cy, distortion=tuple(distortion))
             yield mistake(row, lambda x, c=changed: replace(x, camera=c), camera=changed)  # type: ignore[misc]
