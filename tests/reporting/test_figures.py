@@ -154,3 +154,14 @@ def test_every_line_stands_out_from_white():
     cycle = [str(one["color"]) for one in figures.house_rc()["axes.prop_cycle"]]
     for colour in {*figures.COLOURS.values(), *cycle}:
         assert contrast(colour, "#ffffff") >= 3.0, colour
+
+
+def test_signs_of_a_legend_keep_their_size_in_fewer_columns():
+    fig, (ax,) = drawing.new_strips(1, 3.0)
+    for k in range(4):
+        ax.plot([0, 1], [k, k], "o", ms=6, label=f"a filter with quite a long name {k}")
+    drawing.finish(fig)
+    before = {one.get_markersize() for one in fig.legends[0].legend_handles}
+    figures.fit_text(fig)
+    assert fig.legends[0]._ncols < 4
+    assert {one.get_markersize() for one in fig.legends[0].legend_handles} == before == {9.0}

@@ -191,7 +191,7 @@ def _narrow(figure: Figure, legend: Legend) -> None:
         handles = [one for one in legend.legend_handles if one is not None]
         legend.remove()
         where: Any = f"outside {place} center"
-        legend = figure.legend(handles, texts, loc=where, ncols=columns, markerscale=legend.markerscale)
+        legend = figure.legend(handles, texts, loc=where, ncols=columns, markerscale=1)
 
 
 def _names_of(axes: Axes) -> list[Text]:
