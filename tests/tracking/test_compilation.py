@@ -51,7 +51,9 @@ def test_copies_share_what_is_compiled_and_a_change_below_compiles_anew(tmp_path
         (tmp_path / folder).mkdir(exist_ok=True)
         (tmp_path / folder / "inner.py").write_text(INNER.format(factor))
         (tmp_path / folder / "outer.py").write_text(OUTER)
+        # Within a second two sources of one size are the same to Python's own cache.
         environment = {"XDG_CACHE_HOME": str(tmp_path / "cache"), "PYTHONPATH": f"{tmp_path / folder}:{ROOT}"}
+        environment |= {"PYTHONDONTWRITEBYTECODE": "1"}
         command = [sys.executable, "-c", PROGRAM]
         done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
         return done.stdout.strip()
