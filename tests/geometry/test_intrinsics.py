@@ -108,6 +108,13 @@ def test_the_lens_is_as_simple_as_the_views_say():
     assert choose_lens(BOARD, pixels(wide, views(10, 4, wide)), 640, 480) == ("k1", {})
 
 
+def test_a_covariance_is_that_of_the_jackknife():
+    """n - 1 times the spread of what is left without a view each."""
+    uv = pixels(CAMERA, views(11, 6)) + np.random.default_rng(11).normal(0, 0.2, (6, 54, 2))
+    found = calibrate_camera(BOARD, uv, 640, 512, "k1")
+    np.testing.assert_allclose(found.covariance, 5 * np.cov(found.without.T, bias=True), rtol=1e-9)
+
+
 @pytest.mark.slow
 def test_intervals_hold_the_truth_as_often_as_they_say(n=12, shared=0.3):
     """Noise of each point, and an error that the points of a view share."""

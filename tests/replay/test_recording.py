@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.replay.recordings import read_recording
-from wildlab.geometry import inside_ellipse
+from wildlab.geometry import Terrain, inside_ellipse
 from wildlab.replay.recording import CORNERS, ellipse_rings, save_recording
 from wildlab.replay.scene import Sightings, scene_of
 from wildlab.simulation.twins import simulate_twin
@@ -70,6 +70,19 @@ def test_detections_lie_where_they_were_seen_in_a_smaller_picture(ship, tmp_path
     labels = [one for one in found["/image/seen", "Points2D:labels"].values if one]
     assert labels == [["a/b"], ["evil"]]
     assert bytes(found["/image", "EncodedImage:blob"].values[0][0]) == jpeg
+
+
+def test_terrain_lies_where_it_is_and_what_is_unknown_is_left_out(ship, tmp_path):
+    height = np.arange(12.0, dtype=np.float32).reshape(3, 4)
+    height[0, 0] = np.nan
+    scene = replace(scene_of(ship), terrain=Terrain(height, north=100.0, east=-30.0, step=5.0))
+    found = saved(scene, tmp_path)
+    vertices = np.array(found["/world/terrain", "Mesh3D:vertex_positions"].values[0], float)
+    np.testing.assert_allclose(
+        vertices[6], [-30.0 + 2 * 5, 100.0 + 5, 6.0]
+    )  # east, north, up
+    triangles = np.array(found["/world/terrain", "Mesh3D:triangle_indices"].values[0])
+    assert len(triangles) == 2 * 6 - 2 and 0 not in triangles
 
 
 def test_what_lacks_is_left_out_and_nothing_half_written_stays(ship, tmp_path):
