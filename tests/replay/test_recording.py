@@ -78,9 +78,7 @@ def test_terrain_lies_where_it_is_and_what_is_unknown_is_left_out(ship, tmp_path
     scene = replace(scene_of(ship), terrain=Terrain(height, north=100.0, east=-30.0, step=5.0))
     found = saved(scene, tmp_path)
     vertices = np.array(found["/world/terrain", "Mesh3D:vertex_positions"].values[0], float)
-    np.testing.assert_allclose(
-        vertices[6], [-30.0 + 2 * 5, 100.0 + 5, 6.0]
-    )  # east, north, up
+    np.testing.assert_allclose(vertices[6], [-30.0 + 2 * 5, 100.0 + 5, 6.0])  # east, north, up
     triangles = np.array(found["/world/terrain", "Mesh3D:triangle_indices"].values[0])
     assert len(triangles) == 2 * 6 - 2 and 0 not in triangles
 
