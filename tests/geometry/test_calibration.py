@@ -7,14 +7,17 @@ import pytest
 
 from wildlab.geometry.calibration import (
     BORESIGHT,
+    PARAMETERS,
     Calibration,
     Fit,
     apply_calibration,
     calibrate,
+    calibration_jacobian,
     georeference_calibrated,
     with_covariance,
 )
 from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.corrections import CLOCK_STEP
 from wildlab.geometry.frames import euler_to_matrix, rotation_vector_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.mount import Mount, mount_rotation
@@ -204,3 +207,30 @@ def test_draws_that_wander_together_make_an_estimate_less_sure():
         sd.append(with_covariance(fit, draw, draw).sd("roll"))
     # 2.0 without what neighbours have in common.
     assert 0.75 < np.sqrt(np.mean(np.square(error)) / np.mean(np.square(sd))) < 1.3
+
+
+@pytest.mark.parametrize("looks", ["down", "forward"])
+def test_derivatives_are_those_of_georeferencing(looks):
+    """Against central differences, about a large correction of a lens that distorts."""
+    survey = Survey(7, EVERY_WAY)
+    mount = Mount(looks, pan=0.2, tilt=-1.2 if looks == "forward" else 0.1, misalignment=(0.1, 0.2, -0.1))
+    mount = replace(mount, lever_arm=(0.5, -0.3, 0.2))
+    camera = replace(TAU2, distortion=(-0.2, 0.05, 0.001, -0.002, 0.01), skew=3.0)
+
+    def poses_at(offset):
+        return replace(survey.poses_at(mount)(offset), camera=camera)
+
+    names = tuple(PARAMETERS)
+    sizes = np.random.default_rng(5).uniform(-1, 1, len(names))
+    uv = np.random.default_rng(6).uniform([100, 100], [540, 412], survey.uv.shape)
+
+    def ground(sizes):
+        return georeference_calibrated(Calibration.in_sizes(names, sizes), poses_at, uv, 0.0)[:, :2]
+
+    J = calibration_jacobian(Calibration.in_sizes(names, sizes), poses_at, uv, 0.0)
+    seen = np.isfinite(J).all(axis=(1, 2))
+    assert seen.sum() > 60
+    for i, (name, size) in enumerate(PARAMETERS.items()):
+        step = np.eye(len(names))[i] * (CLOCK_STEP / size if name == "clock" else 1e-6)
+        slope = (ground(sizes + step) - ground(sizes - step)) / (2 * step[i] * size)
+        assert np.allclose(J[seen, :, i], slope[seen], rtol=1e-6, atol=1e-6 * np.abs(slope[seen]).max()), name

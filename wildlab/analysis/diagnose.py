@@ -65,7 +65,7 @@ from wildlab.geometry.calibration import (
     Calibration,
     Fit,
     calibrated_poses,
-    differentiate,
+    calibration_jacobian,
     fit_points,
     georeference_calibrated,
     undetermined_parameter,
@@ -440,10 +440,16 @@ class _Search:
 
     def place(self, names: tuple[str, ...], scaled: Array) -> Array:
         """Errors (N, 2) m with corrections in their usual sizes; positions where places are not known."""
-        values = scaled * np.array([PARAMETERS[name] for name in names])
-        trial = Calibration(names, values, np.zeros((len(names),) * 2), {}, 0, 0)
+        trial = Calibration.in_sizes(names, scaled)
         ground = georeference_calibrated(trial, self.poses_at, self.chosen.uv, self.known[:, 2])
         return ground[:, :2] - self.known[:, :2]
+
+    def slopes(self, names: tuple[str, ...], scaled: Array) -> Array:
+        """Derivatives (N, 2, P) of these errors, m, by corrections in their usual sizes."""
+        J = calibration_jacobian(
+            Calibration.in_sizes(names, scaled), self.poses_at, self.chosen.uv, self.known[:, 2]
+        )
+        return J * [PARAMETERS[name] for name in names]
 
     def fit_robustly(self, inliers: Mask) -> Fit:
         """All parameters that the data determine, by their robust likelihood."""
@@ -486,9 +492,9 @@ class _Search:
         bounds = np.array([BOUNDS[name] / PARAMETERS[name] for name in names])
         start = np.clip(start, -bounds, bounds)
         # Derivatives with what is constant taken off: at logged poses a large error would look like another.
-        values = start * np.array([PARAMETERS[name] for name in names])
-        off = Calibration(names, values, np.zeros((len(names),) * 2), {}, 0, 0)
-        corrected = replace(self.chosen, poses=calibrated_poses(off, self.poses_at))
+        corrected = replace(
+            self.chosen, poses=calibrated_poses(Calibration.in_sizes(names, start), self.poses_at)
+        )
         points = _pose_points(corrected, self.order)[0].take(used)
         # A ray that this tips over the horizon has the derivatives that it was logged with.
         over = ~np.isfinite(points.derivatives).all(axis=(1, 2))
@@ -510,8 +516,7 @@ class _Search:
             return np.nan_to_num(self.place(of, scaled)[used], nan=1e4)
 
         def derivatives(of: tuple[str, ...], scaled: Array) -> Array:
-            J = differentiate(lambda x: self.place(of, x)[used], of, scaled)
-            return np.nan_to_num(J)
+            return np.nan_to_num(self.slopes(of, scaled)[used])
 
         r, J = residuals(names, start), derivatives(names, start)
         wander = estimate_wander(points, r, J * bounds, self.assumed, self.lasts, places)

@@ -8,7 +8,7 @@ of one image share the image's pose error. What the data cannot tell apart is na
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -20,12 +20,14 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.corrections import (
     BORESIGHT,
     BOUNDS,
+    CLOCK_STEP,
     PARAMETERS,
     Calibration,
     PosesAt,
     apply_calibration,
     calibrated_camera,
     calibrated_poses,
+    calibration_jacobian,
     georeference_calibrated,
 )
 from wildlab.geometry.covariances import independent_count
@@ -45,7 +47,7 @@ __all__ = [
     "calibrate",
     "calibrated_camera",
     "calibrated_poses",
-    "differentiate",
+    "calibration_jacobian",
     "fit_points",
     "georeference_calibrated",
     "split_images",
@@ -57,9 +59,6 @@ __all__ = [
 PARALLEL = 0.1
 #: Steps of an estimate, and how often a step that makes it worse is halved.
 ROUNDS, HALVINGS = 30, 8
-#: Seconds either way over which the derivative by the clock is taken. Between two samples of a log the slope
-#: is mostly their noise, and it goes together with the noise of the pose that lies between them.
-CLOCK_STEP = 0.2
 #: Clocks (s) from which the estimate is tried besides zero, as noise of the log makes wells in the
 #: likelihood, and the share of the points that has to have a pose there.
 CLOCK_STARTS = tuple(float(s) for s in np.linspace(-1.0, 1.0, 21))
@@ -130,10 +129,12 @@ def fit_points(
     centre = None if thing is None else _Centre(thing, whiten)
 
     def residuals(names: tuple[str, ...], scaled: Array) -> Array:
-        trial = _unscaled(names, scaled)
-        ground = georeference_calibrated(trial, poses_at, uv, known[:, 2])[:, :2]
-        off = ground - known[:, :2] if centre is None else centre.subtract(ground)
-        return np.asarray(np.einsum("nij,nj->ni", whiten, off))
+        trial = Calibration.in_sizes(names, scaled)
+        off = georeference_calibrated(trial, poses_at, uv, known[:, 2])[:, :2] - known[:, :2]
+        return whitened(off[..., None])[..., 0]
+
+    def whitened(columns: Array) -> Array:
+        return np.asarray(whiten @ (columns if centre is None else centre.subtract(columns)))
 
     wanted = tuple(name for name in PARAMETERS if name in estimate)
     usable = np.asarray(np.isfinite(residuals(wanted, np.zeros(len(wanted)))).all(axis=1))
@@ -195,7 +196,8 @@ def fit_points(
 
     def derivative(names: tuple[str, ...], scaled: Array) -> Array:
         """Derivative (M, 2, P) of the residuals; zero for a ray that misses."""
-        return np.nan_to_num(differentiate(lambda x: residuals(names, x)[usable], names, scaled))
+        J = calibration_jacobian(Calibration.in_sizes(names, scaled), poses_at, uv, known[:, 2])
+        return np.nan_to_num(whitened(J * [PARAMETERS[name] for name in names])[usable])
 
     names, undetermined = wanted, dict[str, tuple[str, ...]]()
     starts = [np.zeros(len(names))] + ([start(names)] if "clock" in names else [])
@@ -311,11 +313,6 @@ def split_images(image: Sequence[object] | np.ndarray, rng: np.random.Generator)
     return np.asarray(first[index])
 
 
-def _unscaled(names: tuple[str, ...], scaled: Array) -> Calibration:
-    values = scaled * np.array([PARAMETERS[name] for name in names])
-    return Calibration(names, values, np.zeros((len(names), len(names))), {}, 0, 0)
-
-
 def _whitening(covariance: ArrayLike | None, n: int) -> Array:
     """(N, 2, 2) factors that give a residual unit covariance; identity without covariances."""
     if covariance is None:
@@ -328,30 +325,6 @@ def _whitening(covariance: ArrayLike | None, n: int) -> Array:
     return W
 
 
-def differentiate(residuals: Callable[[Array], Array], names: tuple[str, ...], scaled: Array) -> Array:
-    """Derivatives (N, 2, P) of residuals by parameters in their usual sizes, by central differences.
-
-    Parameters
-    ----------
-    residuals
-        Takes (P,) and gives (N, 2).
-    names
-        Of the P parameters.
-    scaled
-        (P,) where, in units of :data:`PARAMETERS`.
-
-    Returns
-    -------
-    (N, 2, P)
-    """
-    steps = [CLOCK_STEP / PARAMETERS[name] if name == "clock" else 1e-5 for name in names]
-    columns = [
-        (residuals(scaled + step * axis) - residuals(scaled - step * axis)) / (2 * step)
-        for step, axis in zip(steps, np.eye(len(names)), strict=True)
-    ]
-    return np.stack(columns, axis=-1) if columns else np.zeros((*residuals(scaled).shape, 0))
-
-
 class _Centre:
     """Takes the mean of its thing, weighted by whitening (N, 2, 2), off each point; NaN for one alone."""
 
@@ -359,16 +332,16 @@ class _Centre:
         self._of = np.unique(np.asarray(thing), return_inverse=True)[1]
         self._weights = np.swapaxes(whiten, 1, 2) @ whiten
 
-    def subtract(self, ground: Array) -> Array:
-        """Points (N, 2) less the mean of their things."""
-        good = np.isfinite(ground).all(axis=1) & np.isfinite(self._weights).all(axis=(1, 2))
+    def subtract(self, columns: Array) -> Array:
+        """Columns (N, 2, K) less the mean of their things."""
+        good = np.isfinite(columns).all(axis=(1, 2)) & np.isfinite(self._weights).all(axis=(1, 2))
         of, W = self._of[good], self._weights[good]
-        total = np.zeros((int(self._of.max()) + 1, 2, 3))
-        np.add.at(total, of, np.concatenate([W, W @ ground[good][..., None]], axis=-1))
+        total = np.zeros((int(self._of.max()) + 1, 2, 2 + columns.shape[-1]))
+        np.add.at(total, of, np.concatenate([W, W @ columns[good]], axis=-1))
         several = np.bincount(of, minlength=len(total)) > 1
-        mean = np.full((len(total), 2), np.nan)
-        mean[several] = np.linalg.solve(total[several, :, :2], total[several, :, 2:])[..., 0]
-        return np.asarray(ground - mean[self._of])
+        mean = np.full((len(total), 2, columns.shape[-1]), np.nan)
+        mean[several] = np.linalg.solve(total[several, :, :2], total[several, :, 2:])
+        return np.asarray(columns - mean[self._of])
 
 
 def undetermined_parameter(

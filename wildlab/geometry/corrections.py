@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import stdtrit
 
-from wildlab.geometry.camera import Camera
+from wildlab.geometry.camera import Camera, normalise
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, euler_to_matrix, matrix_to_euler
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.geometry.mount import Mount
+from wildlab.geometry.uncertainty import ground_jacobians
 
 #: Every parameter that can be estimated, in the order in which they are kept when the data cannot carry all;
 #: with the size an error of it would usually have (radians, seconds, metres, shares, pixels, k1). A
@@ -60,6 +61,9 @@ BOUNDS: dict[str, float] = {
 #: Logarithm of the largest factor by which focal lengths are changed, whatever is estimated.
 MOST_FOCAL = 10.0
 BORESIGHT = ("roll", "tilt", "pan")
+#: Seconds either way over which the derivative by the clock is taken. Between two samples of a log the slope
+#: is mostly their noise, and it goes together with the noise of the pose that lies between them.
+CLOCK_STEP = 0.2
 
 #: Poses at the times of N pixels, shifted by so many seconds.
 PosesAt = Callable[[float], CameraPoses]
@@ -95,6 +99,12 @@ class Calibration:
     n_points: int
     n_images: int
     n_draws: int = 0
+
+    @classmethod
+    def in_sizes(cls, names: tuple[str, ...], sizes: Array) -> Calibration:
+        """Corrections to try, without a covariance; ``sizes`` (P,) are in units of :data:`PARAMETERS`."""
+        values = sizes * np.array([PARAMETERS[name] for name in names])
+        return cls(names, values, np.zeros((len(names),) * 2), {}, 0, 0)
 
     def value(self, name: str) -> float:
         """The correction called ``name``, zero where it was not estimated."""
@@ -212,3 +222,67 @@ def georeference_calibrated(
         Where there is another number of poses, or of planes, than of pixels.
     """
     return georeference_pixels(calibrated_poses(calibration, poses_at), uv, plane_down)
+
+
+def calibration_jacobian(
+    calibration: Calibration, poses_at: PosesAt, uv: ArrayLike, plane_down: ArrayLike
+) -> Array:
+    """Derivatives of :func:`georeference_calibrated`, north and east, with respect to its parameters.
+
+    A correction is carried to the ground as what it amounts to: a shift of the airframe, a turn of the
+    airframe or of the mount, a shift of the pixel. The derivative by the clock is a difference over
+    :data:`CLOCK_STEP` either way.
+
+    Parameters
+    ----------
+    calibration
+        P parameters, and the values at which derivatives are taken.
+    poses_at, uv, plane_down
+        As for :func:`georeference_calibrated`.
+
+    Returns
+    -------
+    (N, 2, P), metres per unit of each parameter; NaN where a ray misses the plane.
+
+    Raises
+    ------
+    WildlabError
+        Where there is another number of poses, or of planes, than of pixels.
+    """
+    poses = calibrated_poses(calibration, poses_at)
+    J, camera = ground_jacobians(poses, uv, plane_down), poses.camera
+    turn = J.mount @ np.swapaxes(poses.R_bm, -1, -2)
+    _, tilt, pan = (calibration.value(name) for name in BORESIGHT)
+    lens, scale = normalise(camera, uv), camera.matrix[:2, :2]
+    bent = (np.asarray(uv, float) - (camera.cx, camera.cy)) @ np.linalg.inv(scale).T
+
+    def column(name: str) -> Array:
+        match name:
+            case "north" | "east" | "down":
+                return J.pose[..., ("north", "east", "down").index(name)]
+            case "heading":
+                return np.einsum("...ij,...j->...i", J.pose[..., 3:], poses.R_nb[..., 2, :])
+            case "pan":
+                return turn[..., 2]
+            case "tilt":
+                return turn @ euler_to_matrix(0.0, 0.0, pan)[:, 1]
+            case "roll":
+                return turn @ euler_to_matrix(0.0, tilt, pan)[:, 0]
+            case "clock":
+                step = np.array([one == "clock" for one in calibration.names]) * CLOCK_STEP
+                later, earlier = (
+                    georeference_calibrated(replace(calibration, values=values), poses_at, uv, plane_down)
+                    for values in (calibration.values + step, calibration.values - step)
+                )
+                return (later - earlier)[..., :2] / (2 * CLOCK_STEP)
+            case "centre_u" | "centre_v":
+                return -J.pixel[..., ("centre_u", "centre_v").index(name)]
+        moved = {
+            "focal": bent * (camera.fx, camera.fy),
+            "aspect": bent * (camera.fx / 2, -camera.fy / 2),
+            "radial": lens * (lens**2).sum(axis=-1, keepdims=True) @ scale.T,
+        }[name]
+        return -np.einsum("...ij,...j->...i", J.pixel, moved)
+
+    columns = [column(name) for name in calibration.names]
+    return np.stack(columns, axis=-1) if columns else np.zeros((*lens.shape, 0))
