@@ -49,7 +49,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leave slow tests out, unless CI, ``--run-slow``, ``-m`` or a test named by ``::`` asks for them; then
-    files with slow tests come first, so that no process is left with a long one at the end."""
+    files with slow tests come first, so that no process is left with a long one at the end. What needs a
+    browser is slow."""
+    for item in items:
+        if "chromium" in getattr(item, "fixturenames", ()):
+            item.add_marker("slow")
     named = any("::" in argument for argument in config.args)
     if IN_CI or named or config.getoption("--run-slow") or config.getoption("markexpr"):
         last = {item.path: 0 for item in items} | {item.path: -1 for item in items if "slow" in item.keywords}

@@ -81,7 +81,6 @@ def test_every_name_that_is_offered_has_its_place(reference, room):
             assert places[name].find(re.compile("^h[1-6]$"), string="Parameters") is not None, name
 
 
-@pytest.mark.slow
 def test_the_first_page_opens_in_a_browser(reference, faults):
     index = (reference / "index.html").read_text(encoding="utf-8")
     assert all(f">{room}</a>" in index for room in DOCUMENTED if room.count(".") < 2)

@@ -113,7 +113,6 @@ def test_names_do_nothing_and_nothing_is_asked_for():
     assert not re.search(r"""(?:src|href)=(?!["']data:)""", text)
 
 
-@pytest.mark.slow
 def test_it_plays_and_zooms_in_a_browser(browser: Any, faults: Callable[[Path], list[str]], tmp_path):
     file = tmp_path / "replay.html"
     file.write_text(page(scene_of_a_minute(), shots(61)), encoding="utf-8")

@@ -138,7 +138,6 @@ def test_the_flight_is_that_of_the_twin():
     assert span == pytest.approx(np.ptp(contents["path"][1], axis=0)[::-1], rel=0.02)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("still", ["asked", "stopped", "paper"])
 def test_the_picture_stands_still(browser, tmp_path, still):
     (tmp_path / "index.html").write_text(front_page([]), "utf-8")
@@ -234,7 +233,6 @@ def whole(tmp_path: Path) -> Path:
     return reports
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", PAGES)
 def test_pages_open_anywhere(whole, name, faults):
     assert faults(whole / name) == []

@@ -179,7 +179,6 @@ def test_a_run_that_was_broken_off_counts_as_to_be_done_again(tmp_path, damage):
     assert one.state == "broken off" and not one.has_report
 
 
-@pytest.mark.slow
 def test_ledger_of_every_state_opens_offline(tmp_path, faults):
     first = PUBLISHED.split("[[number]]")[1]
     many = PUBLISHED + "".join(f"[[number]]{first}".replace("kf/all", f"kf/{i}") for i in range(15))
