@@ -56,7 +56,7 @@ def test_without_truth_sightings_are_held_against_each_other():
 @pytest.mark.parametrize("language", LANGUAGES, ids=languages())
 def test_without_a_camera_no_picture_is_spoken_of(language):
     said = " ".join(say(language, one) for one in said_of(tell(RADAR))).lower()
-    assert not any(word in said for word in ("picture", "camera", "bild", "kamera"))
+    assert not any(word in said for word in ("image", "picture", "camera", "bild", "kamera"))
     # A look of the camera is a picture all the same where a radar is beside it.
     assert "unknown.hidden" in keys(tell(RADAR._replace(pictured=900.0)).unknown)
 
