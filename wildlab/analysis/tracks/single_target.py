@@ -212,9 +212,9 @@ class Piece(NamedTuple):
         return (rows >= self.first) & (rows < self.last)
 
 
-#: Row of a scan, place (2,) and covariance (2, 2) of a target: what a linearisation leaves out there, over
-#: all that a detection may be wrong by.
-Bend = Callable[[int, Array, Array], float]
+#: Row of a scan and place (2,) of a target: second derivatives (m, 2, 2) of what is seen there, and all that
+#: a detection may be wrong by (m, m).
+Bend = Callable[[int, Array], tuple[Array, Array]]
 
 
 def bend_of(one: SensorInputs) -> Bend | None:
@@ -225,10 +225,10 @@ def bend_of(one: SensorInputs) -> Bend | None:
     sensor = sensor_of(scans, np.zeros_like(scans.platform))
     errors = errors_of(scans, one.noise)
 
-    def bend(row: int, place: Array, P: Array) -> float:
+    def bend(row: int, place: Array) -> tuple[Array, Array]:
         state = np.append(place, [0.0, 0.0])
         noise = _noise_at(scans, one.noise, errors, row, sensor.predict(row, state))
-        return share_left_out(P, second_derivatives(sensor, row, state), noise)
+        return second_derivatives(sensor, row, state), noise
 
     return bend
 
@@ -253,18 +253,21 @@ def ends_of(inputs: Mapping[str, SensorInputs], merged: Merged, seen: Mapping[st
         found = place_of(inputs[name].scans, row, z, inputs[name].noise)
         return None if found is None else found[0]
 
+    # In a gap the place of the last detection is asked about at every row, and only P changes.
+    before: tuple[Array, tuple[Array, Array] | None] = np.empty(0), None
+
+    def bent_at(row: int, place: Array | None) -> tuple[Array, Array] | None:
+        bend = bends[int(merged.which[row])]
+        return None if bend is None or place is None else bend(int(merged.rows[row]), place)
+
     def ends(row: int, last: int, x_last: Array, P: Array) -> bool:
+        nonlocal before
         if merged.times[row] - merged.times[last] <= gap_s:
             return False
-        for at in (last, row):
-            which, own = int(merged.which[at]), int(merged.rows[at])
-            bend = bends[which]
-            if bend is None:
-                continue
-            place = x_last[:2] if at == last else lone(names[which], own)
-            if place is not None and bend(own, place, P[:2, :2]) > 1:
-                return True
-        return False
+        if before[0] is not x_last:
+            before = x_last, bent_at(last, x_last[:2])
+        here = bent_at(row, lone(names[int(merged.which[row])], int(merged.rows[row])))
+        return any(one is not None and share_left_out(P[:2, :2], *one) > 1 for one in (before[1], here))
 
     return ends
 
