@@ -62,12 +62,13 @@ class ViewPart(Strict):
 
 
 class CameraFile(Strict):
-    """The whole file. ``covariance`` is that of the parameters, in their order and units."""
+    """The whole file. ``covariance`` is that of the parameters, in their order and units; one that is written
+    by hand has ``[camera]`` alone."""
 
     format: Literal[1] = 1
     camera: CameraPart
-    board: BoardPart
-    evidence: EvidencePart
+    board: BoardPart | None = None
+    evidence: EvidencePart | None = None
     covariance: tuple[tuple[float, ...], ...] = ()
     parameter: tuple[ParameterPart, ...] = ()
     view: tuple[ViewPart, ...] = ()

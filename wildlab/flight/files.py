@@ -154,8 +154,9 @@ def did_you_mean(wrong: str, known: Iterable[str]) -> str:
     return f"did you mean {close[0]!r}? Known are {every}" if close else f"use one of {every}"
 
 
-def read_toml(path: Path, what: str) -> dict[str, Any]:
-    """Read a TOML file; `what` is what it is to the user ("the manifest of a flight").
+def read_toml(path: Path, what: str, fix: str = "check the path") -> dict[str, Any]:
+    """Read a TOML file; `what` is what it is to the user ("the manifest of a flight"), `fix` what to do
+    where it is missing.
 
     Raises
     ------
@@ -165,7 +166,7 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
     try:
         content = read_regular(path, TOML_LIMIT)
     except FileNotFoundError:
-        raise WildlabError(f"there is no such file, and it is {what}", "check the path", file=path) from None
+        raise WildlabError(f"there is no such file, and it is {what}", fix, file=path) from None
     try:
         text = content.decode("utf-8")
     except UnicodeDecodeError as error:

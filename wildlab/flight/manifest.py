@@ -697,7 +697,8 @@ def read_manifest(path: Path) -> Manifest:
     WildlabError
         Where it is missing, not TOML, or a key is unknown, missing or wrong.
     """
-    return make_manifest(read_toml(path, "the manifest of a flight"), path)
+    fix = "name the folder of a flight, or make one of logs and images: wildlab import"
+    return make_manifest(read_toml(path, "the manifest of a flight", fix), path)
 
 
 def parse_manifest(text: str, path: Path) -> Manifest:

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.flight.card.roles import QUARTER_S, CardItem, quarters_ahead, span_of
-from wildlab.flight.clock_fitting import match_triggers
 from wildlab.flight.files import printable
 from wildlab.flight.manifest import CameraPart
 from wildlab.flight.readers.log import Stream
 from wildlab.flight.readers.photos import camera_of, of_camera
+from wildlab.flight.recipe.raw import match_images
 from wildlab.flight.units import Span
 
 
@@ -173,12 +173,12 @@ def clock_of_images(
     photos = images.part("photos")
     columns: dict[str, NDArray[Any]] = {} if photos is None else photos.columns
     utc, wall = (_known(columns.get(name)) for name in ("time_s", "time_log_s"))
-    if photos is None or not len(utc) + len(wall):
-        return ImageClock("sequence", 0.0, "The images have no time.")
-    if triggers is not None and stated_offset_s is None:
+    if photos is not None and triggers is not None and stated_offset_s is None:
         clock = _by_triggers(photos, *triggers)
         if clock is not None:
             return clock
+    if photos is None or not len(utc) + len(wall):
+        return ImageClock("sequence", 0.0, "The images have no time.")
     offset = stated_offset_s or 0.0
     if len(utc):
         base = images.log.clock.base if images.log is not None and images.log.clock is not None else ""
@@ -209,21 +209,17 @@ def _flown(own: CardItem | None, others: Sequence[CardItem]) -> Span | None:
 
 def _by_triggers(photos: Stream, name: str, triggers: Stream) -> ImageClock | None:
     """By the records of triggers; None where they do not fit for certain."""
-    stamps = photos.columns.get("time_log_s", photos.columns.get("time_s"))
     times = triggers.columns.get("time_s")
-    if stamps is None or times is None:
+    match = None if times is None else match_images(photos, np.where(triggers.used, times, np.nan))
+    if match is None:
         return None
-    try:
-        match = match_triggers(stamps, np.where(triggers.used, times, np.nan))
-    except WildlabError:
-        return None
-    if not match.certain:
-        return None
+    timed = len(_known(photos.columns.get("time_log_s", photos.columns.get("time_s"))))
+    by = "the pattern of intervals" if timed else "their number and order"
     return ImageClock(
         "utc",
         0.0,
-        f"{len(stamps) - match.images_left} of {len(stamps)} images have the time of a trigger, by the "
-        f"pattern of intervals ({match.triggers_left} left over).",
+        f"{len(photos) - match.images_left} of {len(photos)} images have the time of a trigger, by {by} "
+        f"({match.triggers_left} left over).",
         name,
     )
 

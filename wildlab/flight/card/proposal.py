@@ -310,6 +310,14 @@ class Proposal:
             [one.item for one in self.by_role["target"]],
         )
         self.notes.append(clock.note)
+        if clock.kind == "sequence" and any(map(self.by_role.get, ("own", "camera", "receiver", "target"))):
+            self.notes.append(
+                "The images are left out: the logs go by time. Import as many images as there are records of "
+                "triggers, or write times into them (exiftool -DateTimeOriginal)."
+            )
+            del data["camera"]
+            self.logs.pop("triggers", None)
+            return
         if records is not None and not clock.triggers and wishes.camera_offset_s is None:
             self.notes.append(f"{int(records[1].used.sum())} triggers fit no images for certain: not used.")
         id_ = "stem" if len(set(_stems(photos))) == len(photos) else "file"

@@ -23,6 +23,7 @@ from wildlab.flight.files import did_you_mean, printable, read_regular
 from wildlab.flight.readers.formats import FOLDERS, FORMATS, HEAD, read_folder, read_log, recognise
 from wildlab.flight.readers.frames.image import SUFFIXES
 from wildlab.flight.readers.log import RawLog, Stream
+from wildlab.flight.readers.text import header_of
 from wildlab.flight.recipe.raw import RAW_LIMIT
 from wildlab.flight.units import Span
 from wildlab.geometry.frames import geodetic_to_ned
@@ -209,6 +210,9 @@ def _read(path: Path, name: str, folder: str, zone: str | None) -> CardItem:
 
 
 def _unknown(head: bytes) -> str:
+    if len(header_of(head)) > 1:
+        recipe = "a recipe says what its columns are (data/recipes/README.md, which `wildlab doctor` finds)"
+        return f"a plain table: {recipe}; then wildlab import recipe.toml --source FOLDER"
     return "is empty" if not head else "no reader knows this format"
 
 

@@ -11,9 +11,9 @@ import numpy as np
 from wildlab.flight.checks.attitude import field, forces, heading
 from wildlab.flight.checks.camera import ground, image, lens, terrain_findings
 from wildlab.flight.checks.findings import Finding, Level, report_alone, say
-from wildlab.flight.checks.inertial import inertial, why_no_start
+from wildlab.flight.checks.inertial import inertial, turning, why_no_start
 from wildlab.flight.checks.known_points import known_points
-from wildlab.flight.checks.motion import distinguish_leaps, motion, origin, positions, together
+from wildlab.flight.checks.motion import leaps, motion, origin, positions, together, without_leaps
 from wildlab.flight.checks.sensors import scans, sensors, targets
 from wildlab.flight.checks.tables import (
     bounds,
@@ -42,12 +42,12 @@ Question = Callable[[Flight], Iterator[Finding]]
 
 
 class Meaning(NamedTuple):
-    """A question about meaning, the questions without whose findings it is asked, and whether its clocks are
-    distinguished from leaps of a position."""
+    """A question about meaning, the questions without whose findings it is asked, and whether leaps of a
+    position, which a clock would seem to explain, are taken off first."""
 
     ask: Question
     unless: tuple[Question, ...] = ()
-    leaps: bool = False
+    smooth: bool = False
 
 
 _PLACED = (origin, together, stamps)
@@ -58,14 +58,14 @@ MEANINGS = (
     Meaning(together),
     Meaning(stamps),
     Meaning(motion, _PLACED),
-    Meaning(positions, _PLACED, leaps=True),
+    Meaning(positions, _PLACED, smooth=True),
     Meaning(forces, _PLACED),
     Meaning(field, _PLACED),
     Meaning(heading, (*_PLACED, motion, forces)),
     Meaning(lens),
-    Meaning(scans, leaps=True),
+    Meaning(scans, smooth=True),
     Meaning(targets, (scans,)),
-    Meaning(known_points, leaps=True),
+    Meaning(known_points, smooth=True),
     Meaning(ground, (known_points,)),
 )
 
@@ -118,10 +118,11 @@ def find(flight: Flight, *, plain: bool = True, meaning: bool = True) -> list[Fi
 def contradictions(flight: Flight) -> list[Finding]:
     """Everything in which a flight contradicts itself, with what follows from another one."""
     found: dict[Question, list[Finding]] = {}
-    for ask, unless, leaps in MEANINGS:
+    without, leapt = without_leaps(flight)
+    for ask, unless, smooth in MEANINGS:
         if not any(found.get(other) for other in unless):
-            found[ask] = distinguish_leaps(ask, flight) if leaps else list(ask(flight))
-    return [finding for some in found.values() for finding in some]
+            found[ask] = list(ask(without if smooth else flight))
+    return [*leaps(leapt), *(finding for some in found.values() for finding in some)]
 
 
 def sense_sentences(flight: Flight) -> list[str]:
@@ -368,6 +369,7 @@ PLAIN: tuple[Question, ...] = (
     duplicates,
     image,
     inertial,
+    turning,
     terrain_findings,
     missing,
     uncertainty,

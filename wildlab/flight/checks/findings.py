@@ -565,7 +565,7 @@ def change_by(row: Row, unit: Any = 1.0) -> Change:
     def change(read: Array) -> Array | None:
         value = np.asarray((read if order is None else read[..., order]) * scale + shift)
         for name, limited in (("limit_read", read), ("limit", value)):
-            if name in row and np.nanmax(np.abs(limited)) > row[name]:
+            if name in row and (np.abs(limited) > row[name]).any():
                 return None
         return value
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -25,6 +25,7 @@ from wildlab.errors import WildlabError
 from wildlab.flight.clock_fitting import fit_steady
 from wildlab.flight.readers.log import (
     ANGLES,
+    CUT_OFF,
     FIELD,
     FIX_PLANE,
     FIX_SPACE,
@@ -131,11 +132,13 @@ class MessageTable(Messages):
 
 
 class Records(NamedTuple):
-    """Messages of a binary log by name, bytes of no message, and in how many stretches these lie."""
+    """Messages of a binary log by name, bytes of no message, in how many stretches these lie, and whether the
+    log ends within a message."""
 
     tables: dict[str, MessageTable]
     lost_bytes: int
     places: int
+    cut: bool
 
 
 def sniff(head: bytes) -> bool:
@@ -168,8 +171,7 @@ def read_records(data: bytes) -> Records:
     ends = heads + np.array([one.length for one in known], np.int64)[which]
     begins = _boundaries(heads, ends, len(raw))
     heads, which, ends = heads[begins], which[begins], ends[begins]
-    lost, places = _left_over(raw, heads, ends)
-    return Records(_tables(raw, known, heads, which), lost, places)
+    return Records(_tables(raw, known, heads, which), *_left_over(raw, heads, ends))
 
 
 def _definitions(data: bytes, raw: Bytes, heads: Index) -> tuple[list[Definition], Index]:
@@ -239,14 +241,15 @@ def _boundaries(heads: Index, ends: Index, size: int) -> Mask:
     return begins
 
 
-def _left_over(raw: Bytes, heads: Index, ends: Index) -> tuple[int, int]:
-    """Bytes between messages, and in how many stretches they lie; filling at the end is none."""
+def _left_over(raw: Bytes, heads: Index, ends: Index) -> tuple[int, int, bool]:
+    """Bytes between messages, in how many stretches they lie, and whether some are at the end, where filling
+    is none."""
     starts, stops = np.concatenate([[0], ends]), np.concatenate([heads, [len(raw)]])
     gaps = stops - starts
     rest = raw[starts[-1] :]
     if len(rest) and rest[0] in (0, 255) and (rest == rest[0]).all():
         gaps[-1] = 0
-    return int(gaps.sum()), int((gaps > 0).sum())
+    return int(gaps.sum()), int((gaps > 0).sum()), bool(gaps[-1] > 0)
 
 
 def _tables(raw: Bytes, known: list[Definition], heads: Index, which: Index) -> dict[str, MessageTable]:
@@ -466,7 +469,8 @@ def decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     found = read_records(data)
     where = plural(found.places, "place")
     lost = [(found.lost_bytes, "byte", f"of {len(data)} in {where} belong to no message")]
-    return _decoded(path, found.tables, "message", lost, "")
+    made = _decoded(path, found.tables, "message", lost, "")
+    return replace(made, notes=[*made.notes, *holding({CUT_OFF: found.cut})])
 
 
 def text_decode(path: Path, data: bytes, zone: str | None) -> Decoded:

@@ -310,6 +310,8 @@ STILL = ("photos", "marks", "clicks")
 SENSORS = {"f_": 1000.0, "w_": 100.0, "field_": 1000.0}
 #: Parts with angles -> beyond them none is an angle, deg.
 TURNS = {"poses": 361.0, "gimbal": 720.0}
+#: What is said of a log whose last message is not whole.
+CUT_OFF = "it ends within a message: the file was cut off, or the power was"
 ONE_HEIGHT = "heights above ellipsoid and sea level are the same: they are taken as above sea level"
 _EARTH_M = 6371e3
 

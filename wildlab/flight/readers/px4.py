@@ -21,6 +21,7 @@ from wildlab.flight.clock_fitting import ClockFit, fit_steady
 from wildlab.flight.files import printable
 from wildlab.flight.readers.log import (
     ANGLES,
+    CUT_OFF,
     FIELD,
     FIX_SPACE,
     IMU,
@@ -43,6 +44,8 @@ from wildlab.flight.readers.log import (
 )
 
 MAGIC = b"ULog\x01\x12\x35"
+#: Of each message before its content.
+HEAD_BYTES = 3
 #: Fields of all topics of a log together (real ones have some 5000), and bytes that are no messages.
 MOST_FIELDS, MOST_STRANGE = 50_000, 100_000
 
@@ -93,7 +96,7 @@ def decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     """
     if not data.startswith(MAGIC):
         raise WildlabError("does not begin as a ULog does", "give the .ulg as it was logged", file=path)
-    ulog = _read(path, data)
+    ulog, cut = _read(path, data)
     topics: dict[str, Messages] = {}
     for one in sorted(ulog.data_list, key=lambda one: one.multi_id):
         if "timestamp" in one.data:
@@ -111,14 +114,27 @@ def decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     said = {
         f"the logger fell behind {len(ulog.dropouts)} times and lost {lost_s:.3f} s in all": ulog.dropouts,
         "damaged places are left out": ulog.file_corruption,
+        CUT_OFF: cut,
         "UTC is not known: times count from the start of the system": log.fit is None,
     }
     clock = Clock("") if log.fit is None else Clock.fitted("UTC of the receiver", log.fit)
     return Decoded(parts, _vehicle(ulog.msg_info_dict), clock, notes=notes + holding(said))
 
 
-def _read(path: Path, data: bytes) -> Any:
-    """What pyulog makes of it, of the topics that are wanted."""
+class Watched(io.BytesIO):
+    """Bytes that remember whether the last read got less than it asked for; where a head is asked for, none
+    at all is the end."""
+
+    cut = False
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        found = super().read(size)
+        self.cut = len(found) < (size or 0) and not (size == HEAD_BYTES and not found)
+        return found
+
+
+def _read(path: Path, data: bytes) -> tuple[Any, bool]:
+    """What pyulog makes of it, of the topics that are wanted, and whether it ends within a message."""
     from pyulog import ULog
     from pyulog.exceptions import ULogException
 
@@ -146,7 +162,8 @@ def _read(path: Path, data: bytes) -> Any:
 
     try:
         with contextlib.redirect_stdout(io.StringIO()):
-            return Bounded(io.BytesIO(data), TOPICS, disable_str_exceptions=True)
+            stream = Watched(data)
+            return Bounded(stream, TOPICS, disable_str_exceptions=True), stream.cut
     except (ULogException, ValueError, KeyError, IndexError, TypeError, struct.error) as error:
         problem = f"cannot be read ({printable(str(error))[:80]})"
         raise WildlabError(problem, "copy it again", file=path) from None

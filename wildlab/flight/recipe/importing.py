@@ -106,7 +106,7 @@ def import_flight(
     recipe = read_recipe(recipe_path)
     folder = recipe_path.parent if source is None else Path(source)
     if not folder.is_dir():
-        raise WildlabError("there is no such folder", "check it", file=folder)
+        raise WildlabError("there is no such folder", "name that of the tables with --source", file=folder)
     learnt = None if calibration is None else read_learnt(calibration)
     flight = _build(recipe, RawFiles(folder, recipe_path, recipe.tables, recipe.logs))
     _refuse_problems(flight, recipe, folder)

@@ -31,7 +31,7 @@ import scipy.io
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.clock_fitting import match_triggers
+from wildlab.flight.clock_fitting import TriggerMatch, match_triggers
 from wildlab.flight.files import did_you_mean, inside, printable, read_regular
 from wildlab.flight.readers.autoferry import Part, read_part
 from wildlab.flight.readers.formats import FOLDERS, read_folder, read_log
@@ -371,7 +371,7 @@ class RawFiles:
         except FileNotFoundError:
             raise WildlabError(
                 f"there is no such file, and [{part}] of {self.recipe.name} asks for it",
-                "check its name and the source folder",
+                "check its name, and name its folder with --source",
                 file=path,
                 field=f"{part}.file",
             ) from None
@@ -765,22 +765,37 @@ def of_images(pixels: Stream, images: Stream) -> Stream:
     return Stream({**pixels.columns, "use": use, "why": why}, pixels.rows, pixels.counted_in)
 
 
+def match_images(images: Stream, of_record: Array) -> TriggerMatch | None:
+    """Which image is of which record (N,) of a trigger; None where that is not certain.
+
+    By the pattern of their stamps; of images without any, by their number and order.
+    """
+    stamps = images.columns.get("time_log_s", images.columns.get("time_s"))
+    if stamps is None or not np.isfinite(stamps).any():
+        known = np.flatnonzero(np.isfinite(of_record))
+        return TriggerMatch(known, 0, 0, True) if len(known) == len(images) else None
+    try:
+        match = match_triggers(stamps, of_record)
+    except WildlabError:
+        return None
+    return match if match.certain else None
+
+
 def stamped_by(images: Stream, triggers: Stream, path: Path) -> Stream:
-    """Images with the times of the records of their triggers; those without a record have none.
+    """Images with the times of the records of their triggers; those without a record have none. Images
+    without any stamp have those of as many records, in the order of both.
 
     Raises
     ------
     WildlabError
-        Where neither has times, or no image belongs to a record for certain.
+        Where no record has a time, or no image belongs to a record for certain.
     """
-    stamps = images.columns.get("time_log_s", images.columns.get("time_s"))
     times = triggers.columns.get("time_s")
-    if stamps is None or times is None:
-        problem = "the images or triggers have no times"
-        raise WildlabError(problem, "take out triggers", file=path, field="triggers")
+    if times is None:
+        raise WildlabError("the triggers have no times", "take out triggers", file=path, field="triggers")
     of_record = np.where(triggers.used, times, np.nan)
-    match = match_triggers(stamps, of_record)
-    if not match.certain:
+    match = match_images(images, of_record)
+    if match is None:
         raise WildlabError(
             "images and triggers do not fit for certain",
             "give camera_offset_s in [clocks] instead",
