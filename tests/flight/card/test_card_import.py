@@ -16,10 +16,9 @@ from tests.flight.readers.dataflash_logs import Truth, third_generation
 from wildlab.api.flights import georeference
 from wildlab.cli import wildlab
 from wildlab.errors import WildlabError
-from wildlab.flight.card.importing import import_card, read_card, recipe_beside
-from wildlab.flight.card.proposal import Proposal, Wishes
-from wildlab.flight.readers.formats import read_log
-from wildlab.flight.recipe.importing import import_flight
+from wildlab.flight.card import Proposal, Wishes, import_card, read_card, recipe_beside
+from wildlab.flight.importing import import_flight
+from wildlab.flight.readers import read_log
 from wildlab.flight.store import load_flight
 
 

@@ -18,7 +18,7 @@ from tests.flight.readers.dataflash_logs import (
     third_generation,
 )
 from tests.flight.readers.tracks import Columns, Reader, near
-from wildlab.flight.readers.formats import read_log
+from wildlab.flight.readers import read_log
 from wildlab.flight.readers.log import RawLog, Stream, in_order
 
 dataflash, dataflash_text = Reader("dataflash"), Reader("dataflash-text")

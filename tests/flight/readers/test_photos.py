@@ -17,8 +17,7 @@ from scipy.spatial.transform import Rotation
 from tests.flight.readers import made_up_photos as made
 from tests.flight.readers.tracks import near
 from wildlab.errors import WildlabError
-from wildlab.flight.readers import photos
-from wildlab.flight.readers.formats import read_folder
+from wildlab.flight.readers import photos, read_folder
 from wildlab.flight.readers.log import RawLog
 from wildlab.flight.readers.photos import camera_of, from_nadir, is_photos
 

@@ -14,10 +14,10 @@ from wildlab.flight.calibration_files import CameraFile, read_camera, write_cali
 from wildlab.flight.checks.check import check_flight, usable_for
 from wildlab.flight.clocks import frame_poses, frame_times, truth_at
 from wildlab.flight.files import check_model, dump_toml
-from wildlab.flight.recipe.importing import import_flight
-from wildlab.flight.recipe.model import Recipe
+from wildlab.flight.importing import import_flight
+from wildlab.flight.recipes import Recipe
+from wildlab.flight.schema import UNITS
 from wildlab.flight.store import load_flight
-from wildlab.flight.units import UNITS
 from wildlab.geometry.georeference import pixel_to_plane
 from wildlab.geometry.mount import camera_pose
 from wildlab.paths import DATA

@@ -51,8 +51,8 @@ from wildlab.flight.checks.inertial import (
     moves,
     samples,
 )
+from wildlab.flight.schema import other_units
 from wildlab.flight.store import Flight
-from wildlab.flight.units import other_units
 from wildlab.geometry.frames import Array, matrix_to_euler, quaternion_to_matrix
 from wildlab.geometry.gravity import USUAL_GRAVITY
 from wildlab.names import listed

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.flight.manifest import replace_in_manifest
+from wildlab.flight.schema import UNITS
 from wildlab.flight.store import Flight
-from wildlab.flight.units import UNITS
 from wildlab.geometry.frames import (
     R_NED_ENU,
     Array,

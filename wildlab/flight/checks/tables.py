@@ -22,11 +22,11 @@ from wildlab.flight.checks.findings import (
     finite_rows,
     part_of,
 )
+from wildlab.flight.clock_fitting import Span
 from wildlab.flight.clocks import covariances, frame_times, gnss_times, longest_gap
 from wildlab.flight.files import printable
 from wildlab.flight.schema import NAV, TABLES, Table, extra_columns
 from wildlab.flight.store import Flight
-from wildlab.flight.units import Span
 from wildlab.geometry.frames import Array
 
 #: Truth further from every pose than this belongs to another flight, or has its coordinates exchanged.

@@ -22,7 +22,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.clock_fitting import fit_steady
+from wildlab.flight.clock_fitting import fit_steady, week_to_utc
 from wildlab.flight.readers.log import (
     ANGLES,
     CUT_OFF,
@@ -35,10 +35,10 @@ from wildlab.flight.readers.log import (
     Array,
     Clock,
     Columns,
-    Decoded,
     Mask,
     Messages,
-    Readings,
+    RawLog,
+    Stream,
     any_of,
     at_times,
     holding,
@@ -48,9 +48,8 @@ from wildlab.flight.readers.log import (
     placed,
     usable,
 )
-from wildlab.flight.readers.text import plural
+from wildlab.flight.readers.text import plural, told
 from wildlab.flight.schema import BOUNDS
-from wildlab.flight.units import week_to_utc
 
 Bytes = NDArray[np.uint8]
 Index = NDArray[np.int64]
@@ -451,14 +450,14 @@ class ArdupilotLog(NamedTuple):
 
     def readings(
         self, table: MessageTable, columns: dict[str, Array], unusable: dict[str, Mask] | None = None
-    ) -> Readings:
+    ) -> Stream:
         """Columns of messages with their times; all rows count, with a place or without."""
         stamps = self.of(table)
         times = {"time_s": self.utc(stamps), "time_log_s": stamps}
-        return Readings(times | columns, table.rows, self.counted_in, unusable or {}, anywhere=True)
+        return Stream(times | columns, table.rows, self.counted_in, unusable or {}, anywhere=True)
 
 
-def decode(path: Path, data: bytes, zone: str | None) -> Decoded:
+def decode(path: Path, data: bytes, zone: str | None) -> RawLog:
     """A DataFlash log, its rows counted in messages.
 
     Raises
@@ -473,7 +472,7 @@ def decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     return replace(made, notes=[*made.notes, *holding({CUT_OFF: found.cut})])
 
 
-def text_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
+def text_decode(path: Path, data: bytes, zone: str | None) -> RawLog:
     """A DataFlash log as text, its rows counted in lines; errors as of `decode`."""
     tables, lost, title = read_lines(data)
     return _decoded(path, tables, "line", lost, title)
@@ -487,7 +486,7 @@ def _decoded(
     counted_in: str,
     lost: Sequence[tuple[int, str, str]],
     title: str,
-) -> Decoded:
+) -> RawLog:
     """A log of messages; `title` is what the file says of the vehicle outside of them."""
     if not set(tables) - {"FMT"}:
         problem = "holds no message of ArduPilot"
@@ -514,7 +513,7 @@ def _decoded(
     said = [text for name, field in (("VER", "FWS"), ("MSG", "Message")) if name in tables
             for text in tables[name].texts(field)]  # fmt: skip
     vehicle = next((match.group() for text in (*said, title) if (match := _VEHICLE.search(text))), "")
-    return Decoded(parts, vehicle, log.clock, [*lost, *left_out], _notes(log, parts, receivers, place))
+    return RawLog(parts, vehicle, log.clock, told(*lost, *left_out), _notes(log, parts, receivers, place))
 
 
 # -- times
@@ -633,7 +632,7 @@ class PlaceTrack(NamedTuple):
         return at_times(self.stamps, self.columns, stamps, f"messages {self.name}", ~high)
 
 
-def _gnss(log: ArdupilotLog, receiver: MessageTable) -> Readings:
+def _gnss(log: ArdupilotLog, receiver: MessageTable) -> Stream:
     """Satellite positions of one receiver, with what messages GPA say of how sure it was."""
     stamps, columns = log.of(receiver), receiver.columns(GNSS)
     speed = receiver.get("Spd")
@@ -652,7 +651,7 @@ def _gnss(log: ArdupilotLog, receiver: MessageTable) -> Readings:
         # Its parts to the north and east may each be possible.
         "impossible speed": speed > BOUNDS["speed"][1],
     }
-    return Readings(columns, receiver.rows, log.counted_in, unusable)
+    return Stream(columns, receiver.rows, log.counted_in, unusable)
 
 
 def _accuracies(receiver: MessageTable, log: ArdupilotLog, stamps: Array, down: Array) -> dict[str, Array]:
@@ -689,7 +688,7 @@ def _place_of(name: str, log: ArdupilotLog) -> PlaceTrack | None:
     return place if np.isfinite(place.at(place.stamps)["latitude_deg"]).any() else None
 
 
-def _place_of_gnss(gnss: Readings, receiver: MessageTable, log: ArdupilotLog) -> PlaceTrack | None:
+def _place_of_gnss(gnss: Stream, receiver: MessageTable, log: ArdupilotLog) -> PlaceTrack | None:
     """Positions of the satellite receiver; heights above home where its messages have the autopilot's."""
     stamps, clock = gnss.columns["time_log_s"], log.clock
     if clock is not None and clock.base:
@@ -726,7 +725,7 @@ SENSORS: dict[str, tuple[tuple[str, ...], str, dict[str, str], float]] = {
 }  # fmt: skip
 
 
-def _sensor(log: ArdupilotLog, part: str) -> Readings | None:
+def _sensor(log: ArdupilotLog, part: str) -> Stream | None:
     """A part of the first sensor of its kind, as `SENSORS` has it; None where the log has none."""
     names, needed, fields, factor = SENSORS[part]
     table = log.first(names, *needed.split())
@@ -740,7 +739,7 @@ def _sensor(log: ArdupilotLog, part: str) -> Readings | None:
     return log.readings(table, columns)
 
 
-def _poses(log: ArdupilotLog, place: PlaceTrack | None) -> Readings | None:
+def _poses(log: ArdupilotLog, place: PlaceTrack | None) -> Stream | None:
     """Attitudes with the positions at their times; None where the log has no attitude.
 
     Attitudes are those of messages ATT, else quaternions of XKQ or NKQ, else of AHR2.
@@ -762,10 +761,10 @@ def _poses(log: ArdupilotLog, place: PlaceTrack | None) -> Readings | None:
         columns |= at_times(log.of(moving), v, stamps, f"messages {moving.name}")
     high = any_of([np.isfinite(where[one]) for one in _PLACE[2:]], len(table))
     low = np.isfinite(where["latitude_deg"]) & ~high
-    return log.readings(table, columns | where, {"no height": low})._replace(anywhere=False)
+    return replace(log.readings(table, columns | where, {"no height": low}), anywhere=False)
 
 
-def _imu(log: ArdupilotLog) -> Readings | None:
+def _imu(log: ArdupilotLog) -> Stream | None:
     """Specific force and rates of turn of the first IMU; None where the log has none."""
     f, w = (named(IMU[at : at + 3], (f"{start}{axis}" for axis in "XYZ"))
             for at, start in ((0, "Acc"), (3, "Gyr")))  # fmt: skip
@@ -781,7 +780,7 @@ def _imu(log: ArdupilotLog) -> Readings | None:
 
 
 def _notes(
-    log: ArdupilotLog, parts: dict[str, Readings], receivers: list[MessageTable], place: PlaceTrack | None
+    log: ArdupilotLog, parts: dict[str, Stream], receivers: list[MessageTable], place: PlaceTrack | None
 ) -> list[str]:
     clock, receiver = log.clock, next((i for i, one in enumerate(receivers, 1) if one is log.receiver), 0)
     unstamped = [

@@ -25,7 +25,7 @@ import numpy as np
 import pandas as pd
 
 from wildlab.errors import WildlabError
-from wildlab.flight.clock_fitting import ClockFit, fit_clock
+from wildlab.flight.clock_fitting import WEEK_S, ClockFit, fit_clock, wall_to_utc, week_to_utc
 from wildlab.flight.readers.log import (
     ANGLES,
     PLACE,
@@ -33,9 +33,9 @@ from wildlab.flight.readers.log import (
     WORLD,
     Array,
     Clock,
-    Decoded,
     Mask,
-    Readings,
+    RawLog,
+    Stream,
     holding,
     named,
 )
@@ -48,8 +48,8 @@ from wildlab.flight.readers.text import (
     plural,
     read_text_table,
     stamp_s,
+    told,
 )
-from wildlab.flight.units import WEEK_S, wall_to_utc, week_to_utc
 
 #: What is said of a clock without a zone.
 NO_ZONE = "local time without a zone"
@@ -80,7 +80,7 @@ def srt_sniff(head: bytes) -> bool:
     return _CODES.search(text) is not None and _TRACE.search(text) is not None
 
 
-def srt_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
+def srt_decode(path: Path, data: bytes, zone: str | None) -> RawLog:
     """Subtitles of a video, a row each.
 
     Without a zone, rows with a wall clock are marked; where there is no clock at all, stamps are the
@@ -114,12 +114,12 @@ def srt_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     }
     parts = {"gnss": (*_PLACE, "satellites"), "poses": (*_PLACE, *_AIRCRAFT), "gimbal": _GIMBAL}
     made = {
-        part: Readings(times | {name: columns[name] for name in names}, rows, "subtitle", reasons)
+        part: Stream(times | {name: columns[name] for name in names}, rows, "subtitle", reasons)
         for part, names in parts.items()
         if np.isfinite(columns[names[-1]]).any() or part == "gnss"
     }
-    lost = [(len(found) - len(rows), "subtitle", f"of {len(found)} without a place")]
-    return Decoded(made, clock=clock, lost=lost, notes=holding(notes))
+    lost = told((len(found) - len(rows), "subtitle", f"of {len(found)} without a place"))
+    return RawLog(made, clock=clock, lost=lost, notes=holding(notes))
 
 
 def _block(code: re.Match[str], body: str) -> dict[str, float]:
@@ -215,7 +215,7 @@ def mrk_sniff(head: bytes) -> bool:
     return any(_ROW.match(line) for line in decode(head).splitlines()[:5])
 
 
-def mrk_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
+def mrk_decode(path: Path, data: bytes, zone: str | None) -> RawLog:
     """Records of images, a line each.
 
     Raises
@@ -243,10 +243,10 @@ def mrk_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
         "sd_vertical_m": up,
         "fix": fix,
     }
-    return Decoded(
-        {"triggers": Readings(columns, [at for at, _ in found], "line")},
+    return RawLog(
+        {"triggers": Stream(columns, [at for at, _ in found], "line")},
         clock=Clock.shifted("GPS weeks", columns["time_log_s"], time),
-        lost=[(len(lines) - len(found), "line", f"of {len(lines)} could not be read")],
+        lost=told((len(lines) - len(found), "line", f"of {len(lines)} could not be read")),
         notes=["places are those of the camera, not the antenna"],
     )
 
@@ -304,7 +304,7 @@ def airdata_sniff(head: bytes) -> bool:
     return {"datetime_utc", "latitude", "longitude"} <= set(header_of(head))
 
 
-def airdata_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
+def airdata_decode(path: Path, data: bytes, zone: str | None) -> RawLog:
     """A flight record, a row for each line.
 
     Raises
@@ -332,10 +332,10 @@ def airdata_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     own = columns.get("time_log_s", np.full(len(whole), np.nan))
     time, clock = _fraction(own, whole, notes)
     times = {"time_s": time, "time_log_s": own if np.isfinite(own).any() else whole}
-    return Decoded(
+    return RawLog(
         _parts(times, columns, np.array(table.lines), notes),
         clock=clock,
-        lost=table.lost(),
+        lost=told(table.lost()),
         notes=notes,
     )
 
@@ -345,7 +345,7 @@ def _parts(
     columns: dict[str, Array],
     rows: Array,
     notes: list[str],
-) -> dict[str, Readings]:
+) -> dict[str, Stream]:
     def of(*names: str) -> dict[str, Array]:
         return times | {name: columns[name] for name in names if name in columns}
 
@@ -358,11 +358,11 @@ def _parts(
             notes += _heading_that_stands(columns["yaw_world_deg"], columns["yaw_deg"])
     photo = np.nan_to_num(columns.get("photo", np.zeros(len(rows)))) > 0
     taken = photo & ~np.r_[False, photo[:-1]]
-    made = {name: Readings(one, rows, "line") for name, one in parts.items()}
+    made = {name: Stream(one, rows, "line") for name, one in parts.items()}
     if taken.any():
         own = {name: values[taken] for name, values in of(*PLACE, *ANGLES).items()}
         own["number"] = np.arange(1.0, taken.sum() + 1)
-        made["triggers"] = Readings(own, rows[taken], "line")
+        made["triggers"] = Stream(own, rows[taken], "line")
     return made
 
 

@@ -18,11 +18,10 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.flight.clock_fitting import ClockFit
+from wildlab.flight.clock_fitting import GPS_START_S, ClockFit
 from wildlab.flight.clocks import between
 from wildlab.flight.readers.text import LATEST_S, decode, plural
 from wildlab.flight.schema import BOUNDS
-from wildlab.flight.units import GPS_START_S
 from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
 
 Array = NDArray[np.float64]
@@ -145,8 +144,9 @@ def any_of(masks: Iterable[ArrayLike], count: int) -> Mask:
     return np.asarray(np.logical_or.reduce([*none, *masks]), bool)
 
 
-class Readings(NamedTuple):
-    """One part as a reader decodes it, before anything is judged.
+@dataclass(frozen=True)
+class Stream:
+    """One part of a log; once it is judged, with the columns of `MARKS`.
 
     Attributes
     ----------
@@ -163,46 +163,13 @@ class Readings(NamedTuple):
     """
 
     columns: dict[str, Any]
-    rows: ArrayLike | None = None
+    rows: Any = None
     counted_in: str = "message"
-    unusable: Mapping[str, Mask] = {}
+    unusable: Mapping[str, Mask] = field(default_factory=dict)
     anywhere: bool = False
 
-
-@dataclass(frozen=True)
-class Decoded:
-    """What `decode` of a format gives.
-
-    Attributes
-    ----------
-    parts
-        By name, see `PARTS`.
-    vehicle, clock
-        As of `RawLog`.
-    lost
-        How much of what could not be read: a number, what it counts, and the rest of the sentence. Of none
-        nothing is said.
-    notes
-        Sentences on what a user should know of it.
-    """
-
-    parts: dict[str, Readings]
-    vehicle: str = ""
-    clock: Clock | None = None
-    lost: Sequence[tuple[int, str, str]] = ()
-    notes: Sequence[str] = ()
-
-
-@dataclass(frozen=True)
-class Stream:
-    """One part of a log: its columns (N,), and for each row where it stands in the file, counted from 1."""
-
-    columns: dict[str, NDArray[Any]]
-    rows: NDArray[np.int64]
-    counted_in: str = "message"
-
     def __len__(self) -> int:
-        return len(self.rows)
+        return len(next(iter(self.columns.values())))
 
     @property
     def used(self) -> Mask:
@@ -210,22 +177,19 @@ class Stream:
         return np.asarray(self.columns["use"] == 1.0)
 
     def take(self, rows: NDArray[Any]) -> Stream:
-        """The rows that a mask or an index picks."""
-        return Stream(
-            {name: one[rows] for name, one in self.columns.items()}, self.rows[rows], self.counted_in
-        )
+        """The rows that a mask or an index picks, of what was judged."""
+        columns = {name: one[rows] for name, one in self.columns.items()}
+        return Stream(columns, self.rows[rows], self.counted_in)
 
 
 @dataclass(frozen=True)
 class RawLog:
-    """A log, read.
+    """A log, as `decode` of its format gives it, and judged.
 
     Attributes
     ----------
-    format
-        As in `formats.FORMATS`.
     parts
-        By name, see `PARTS`; only those that the log has rows of.
+        By name, see `PARTS`; once judged only those that the log has rows of.
     vehicle
         What it says of what carried it, in its words: ``"ArduCopter V3.1.3"``. Empty: nothing.
     clock
@@ -236,12 +200,11 @@ class RawLog:
         Sentences on what a user should know of it.
     """
 
-    format: str
-    parts: dict[str, Stream] = field(default_factory=dict)
+    parts: dict[str, Stream]
     vehicle: str = ""
     clock: Clock | None = None
-    lost: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
+    lost: Sequence[str] = ()
+    notes: Sequence[str] = ()
 
 
 def make_stream(
@@ -289,8 +252,7 @@ def make_stream(
     for reason, holds in (unusable or {}).items():
         why[np.asarray(holds, bool) & (why == "")] = reason
     at = np.arange(1, count + 1) if rows is None else np.asarray(rows, np.int64)
-    marks: dict[str, NDArray[Any]] = {"use": (why == "").astype(np.float64), "why": why}
-    return Stream({**made, **marks}, at, counted_in)
+    return Stream({**made, "use": (why == "").astype(np.float64), "why": why}, at, counted_in)
 
 
 # -- which rows can be used, and what is said of a log
@@ -316,13 +278,11 @@ ONE_HEIGHT = "heights above ellipsoid and sea level are the same: they are taken
 _EARTH_M = 6371e3
 
 
-def judge_log(format_: str, found: Decoded, track: bool) -> RawLog:
+def judge_log(found: RawLog, track: bool) -> RawLog:
     """A log out of what its reader decoded.
 
     Parameters
     ----------
-    format_
-        As in `formats.FORMATS`.
     found
         What `decode` gave.
     track
@@ -333,12 +293,12 @@ def judge_log(format_: str, found: Decoded, track: bool) -> RawLog:
     RawLog
         With the parts that have rows. Columns without any value are left out, but for times and angles.
     """
-    parts = {name: one for name, one in found.parts.items() if len(next(iter(one.columns.values())))}
+    parts = {name: one for name, one in found.parts.items() if len(one)}
     notes = list(found.notes)
     for name, one in parts.items():
         columns = one.columns if name in STILL else _filled(name, one)
         notes += drop_rare_heights(columns) if track else []
-        parts[name] = one._replace(columns=columns)
+        parts[name] = replace(one, columns=columns)
     if "gnss" in parts and _one_height(parts["gnss"].columns):
         notes.append(ONE_HEIGHT)
         for name in ("poses", "gnss"):
@@ -350,11 +310,10 @@ def judge_log(format_: str, found: Decoded, track: bool) -> RawLog:
         )
         for name, one in parts.items()
     }
-    lost = tuple(f"{plural(count, what)} {rest}".rstrip() for count, what, rest in found.lost if count)
-    return RawLog(format_, streams, found.vehicle, found.clock, lost, tuple(dict.fromkeys(notes)))
+    return replace(found, parts=streams, lost=tuple(found.lost), notes=tuple(dict.fromkeys(notes)))
 
 
-def _filled(part: str, one: Readings) -> dict[str, Any]:
+def _filled(part: str, one: Stream) -> dict[str, Any]:
     """Columns with any value; images may be taken before the first fix, and then have no place."""
     columns = dict(one.columns)
     if one.anywhere and "latitude_deg" in columns:
@@ -410,7 +369,7 @@ def _misplaced(latitude: Array, longitude: Array) -> dict[str, Mask]:
         }
 
 
-def judge(part: str, decoded: Readings) -> dict[str, Mask]:
+def judge(part: str, decoded: Stream) -> dict[str, Mask]:
     """Why rows of a part cannot be used.
 
     Parameters
@@ -687,7 +646,7 @@ def fix_reasons(fix: Array) -> dict[str, Mask]:
     return {"no fix": fix < FIX_PLANE, "a fix without height": fix < FIX_SPACE}
 
 
-def usable(part: str, found: Readings) -> Mask:
+def usable(part: str, found: Stream) -> Mask:
     """(N,) rows of a part that can be used."""
     return ~any_of(judge(part, found).values(), len(found.columns["time_log_s"]))
 
@@ -718,7 +677,7 @@ def at_times(
     own = np.asarray(stamps, float)
     place = {name: one for name, one in values.items() if name.startswith(("lat", "lon", "height_"))}
     none = np.isnan(own) if doubtful is None else np.isnan(own) | doubtful
-    good = usable("", Readings({"time_log_s": own, **place}, unusable={"doubtful": none}))
+    good = usable("", Stream({"time_log_s": own, **place}, unusable={"doubtful": none}))
     found, finite = np.full((len(times), len(values)), np.nan), np.isfinite(times)
     if good.any():
         taken = {name: one[good] for name, one in values.items()}
@@ -733,7 +692,7 @@ def at_times(
     return made
 
 
-def heading_at(poses: Readings | None, times_s: Array, clock: str = "time_s") -> Array:
+def heading_at(poses: Stream | None, times_s: Array, clock: str = "time_s") -> Array:
     """Yaw of the vehicle at times (N,) of a clock of its poses, deg; NaN where they do not reach."""
     if poses is None or not (used := usable("poses", poses)).any():
         return np.full(len(times_s), np.nan)

@@ -28,6 +28,7 @@ from PIL import ExifTags, Image
 from scipy.spatial.transform import Rotation
 
 from wildlab.errors import WildlabError
+from wildlab.flight.clock_fitting import wall_to_utc
 from wildlab.flight.files import regular_size, unreadable
 from wildlab.flight.readers.frames.image import (
     CAMERA,
@@ -48,15 +49,13 @@ from wildlab.flight.readers.log import (
     WORLD,
     Array,
     Clock,
-    Decoded,
     RawLog,
-    Readings,
+    Stream,
     any_of,
     holding,
     named,
 )
-from wildlab.flight.readers.text import LATEST_S, plural, stamp_s
-from wildlab.flight.units import wall_to_utc
+from wildlab.flight.readers.text import LATEST_S, plural, stamp_s, told
 
 #: Bytes of XMP that are looked through.
 MOST_XMP = 1_000_000
@@ -534,7 +533,7 @@ OFF_S = 2.0
 LOCAL, BY_GPS, BY_ZONE = "local time without a zone", "GPS time of the images", "zones that the images state"
 
 
-def folder_decode(folder: Path, zone: str | None) -> Decoded:
+def folder_decode(folder: Path, zone: str | None) -> RawLog:
     """The images of a folder and of all folders below it, as a card has them: ``100MEDIA``, ``101MEDIA``.
 
     Parameters
@@ -546,7 +545,7 @@ def folder_decode(folder: Path, zone: str | None) -> Decoded:
 
     Returns
     -------
-    Decoded
+    RawLog
         With the part ``photos``, by folders and in the order of names; files of folders below have names
         with ``/``. Angles of the airframe are ``roll_deg`` and so on, those of the optical axis
         ``roll_world_deg`` and so on. Sizes are those of the pixels that are read: of FLIR's raw image,
@@ -594,16 +593,16 @@ def folder_decode(folder: Path, zone: str | None) -> Decoded:
         notes += said
     problems = Counter(one.problem for one in tags if one.problem)
     makers = {name for name in cameras if name}
-    part = Readings(
+    part = Stream(
         columns | {"time_log_s": wall, "time_s": time},
         unusable={reason: np.array(why) == reason for reason in dict.fromkeys(why) if reason},
         counted_in="image",
     )
-    return Decoded(
+    return RawLog(
         {"photos": part},
         vehicle=makers.pop() if len(makers) == 1 else "",
         clock=max(clocks, key=lambda one: one.pairs, default=None),
-        lost=[*lost, *((count, "image", f": {what}") for what, count in problems.items())],
+        lost=told(*lost, *((count, "image", f": {what}") for what, count in problems.items())),
         notes=[*notes, *_notes(tags, cameras, stated, why)],
     )
 

@@ -30,9 +30,9 @@ from wildlab.flight.readers.log import (
     WORLD,
     Array,
     Clock,
-    Decoded,
     Messages,
-    Readings,
+    RawLog,
+    Stream,
     at_times,
     device_angles,
     euler_deg,
@@ -85,7 +85,7 @@ def sniff(head: bytes) -> bool:
     return head.startswith(MAGIC)
 
 
-def decode(path: Path, data: bytes, zone: str | None) -> Decoded:
+def decode(path: Path, data: bytes, zone: str | None) -> RawLog:
     """A ULog.
 
     Raises
@@ -118,7 +118,7 @@ def decode(path: Path, data: bytes, zone: str | None) -> Decoded:
         "UTC is not known: times count from the start of the system": log.fit is None,
     }
     clock = Clock("") if log.fit is None else Clock.fitted("UTC of the receiver", log.fit)
-    return Decoded(parts, _vehicle(ulog.msg_info_dict), clock, notes=notes + holding(said))
+    return RawLog(parts, _vehicle(ulog.msg_info_dict), clock, notes=notes + holding(said))
 
 
 class Watched(io.BytesIO):
@@ -210,12 +210,12 @@ class Px4Log(NamedTuple):
         nothing = Messages(names[0], {}, np.zeros(0, np.int64))
         return next((self.topics[name] for name in names if name in self.topics), nothing)
 
-    def readings(self, found: Messages, columns: dict[str, Array], **more: object) -> Readings:
+    def readings(self, found: Messages, columns: dict[str, Array], **more: object) -> Stream:
         """Columns of a topic with ``time_s`` (UTC, NaN where that is not known) and ``time_log_s``."""
         taken = taken_s(found)
         utc = np.full(len(taken), np.nan) if self.fit is None else self.fit.to_reference(taken)
         times = {"time_s": utc, "time_log_s": taken}
-        return Readings(times | columns, found.rows, f"message of {found.name}", **more)  # type: ignore[arg-type]
+        return Stream(times | columns, found.rows, f"message of {found.name}", **more)  # type: ignore[arg-type]
 
 
 def taken_s(found: Messages) -> Array:
@@ -226,7 +226,7 @@ def taken_s(found: Messages) -> Array:
     return np.where(true, sample, stamp)
 
 
-def _parts(log: Px4Log) -> tuple[dict[str, Readings], list[str]]:
+def _parts(log: Px4Log) -> tuple[dict[str, Stream], list[str]]:
     """All parts that there are rows of, and sentences on what a user should know of them."""
     notes: list[str] = []
     poses = _poses(log, notes)
@@ -241,7 +241,7 @@ def _parts(log: Px4Log) -> tuple[dict[str, Readings], list[str]]:
     return {name: one for name, one in parts.items() if one is not None}, notes
 
 
-def _poses(log: Px4Log, notes: list[str]) -> Readings | None:
+def _poses(log: Px4Log, notes: list[str]) -> Stream | None:
     attitude = log.first("vehicle_attitude")
     place, local = log.first("vehicle_global_position"), log.first("vehicle_local_position")
     if not attitude.has("q[0]"):
@@ -308,7 +308,7 @@ def _local_motion(local: Messages) -> dict[str, Array]:
     }
 
 
-def _gnss(log: Px4Log) -> Readings:
+def _gnss(log: Px4Log) -> Stream:
     found = log.first("vehicle_gps_position", "sensor_gps")
     velocity = found.columns(named(VELOCITY, ("vel_n_m_s", "vel_e_m_s", "vel_d_m_s")))
     moving = found.get("vel_ned_valid") != 0
@@ -317,13 +317,13 @@ def _gnss(log: Px4Log) -> Readings:
     return log.readings(found, columns, unusable=fix_reasons(columns["fix"]))
 
 
-def _imu(log: Px4Log) -> Readings:
+def _imu(log: Px4Log) -> Stream:
     found = log.first("sensor_combined")
     names = [f"{name}[{i}]" for name in ("accelerometer_m_s2", "gyro_rad") for i in range(3)]
     return log.readings(found, found.columns(named(IMU, names)))
 
 
-def _magnetometer(log: Px4Log) -> Readings | None:
+def _magnetometer(log: Px4Log) -> Stream | None:
     for name in ("vehicle_magnetometer", "sensor_mag", "sensor_combined"):
         found = log.first(name)
         fields = "xyz" if name == "sensor_mag" else [f"magnetometer_ga[{i}]" for i in range(3)]
@@ -333,13 +333,13 @@ def _magnetometer(log: Px4Log) -> Readings | None:
     return None
 
 
-def _triggers(log: Px4Log) -> Readings:
+def _triggers(log: Px4Log) -> Stream:
     found = log.first("camera_capture", "camera_trigger")
     fields = LAT_LON | {"height_sea_m": "alt"} if found.has("lat") else {}
     return log.readings(found, found.columns({"number": "seq", **fields}), anywhere=True)
 
 
-def _gimbal(log: Px4Log, poses: Readings | None) -> Readings | None:
+def _gimbal(log: Px4Log, poses: Stream | None) -> Stream | None:
     device, mount = log.first("gimbal_device_attitude_status"), log.first("mount_orientation")
     if device.has("q[0]"):
         heading = heading_at(poses, taken_s(device), "time_log_s")

@@ -30,9 +30,8 @@ from wildlab.flight.manifest import (
     TerrainSays,
     make_manifest,
 )
-from wildlab.flight.recipe.model import Recipe, read_recipe
-from wildlab.flight.recipe.raw import RawFiles, nanoseconds, plain_numbers
-from wildlab.flight.recipe.tables import (
+from wildlab.flight.raw_files import RawFiles, nanoseconds, plain_numbers
+from wildlab.flight.recipe_tables import (
     LocalFrame,
     Rows,
     frames_of_rows,
@@ -42,6 +41,7 @@ from wildlab.flight.recipe.tables import (
     read_sensors,
     read_truth,
 )
+from wildlab.flight.recipes import Recipe, read_recipe
 from wildlab.flight.store import Flight, save_flight
 from wildlab.flight.terrain import lay_terrain
 

@@ -31,14 +31,14 @@ import scipy.io
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.clock_fitting import TriggerMatch, match_triggers
+from wildlab.flight.clock_fitting import TriggerMatch, find_zone, match_triggers
 from wildlab.flight.files import did_you_mean, inside, printable, read_regular
+from wildlab.flight.readers import FOLDERS, read_folder, read_log
 from wildlab.flight.readers.autoferry import Part, read_part
-from wildlab.flight.readers.formats import FOLDERS, read_folder, read_log
 from wildlab.flight.readers.log import RawLog, Stream
 from wildlab.flight.readers.photos import of_camera
-from wildlab.flight.recipe.model import Decimal, LogTable, MatlabTable, Quantity, Series, Stamp
-from wildlab.flight.units import Dimension, factor, find_zone
+from wildlab.flight.recipes import Decimal, LogTable, MatlabTable, Quantity, Series, Stamp
+from wildlab.flight.schema import Dimension, factor
 
 _WHOLE = re.compile(r"[-+]?\d+", re.ASCII)
 #: Rows that are Python strings at a time.
