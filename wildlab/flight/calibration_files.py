@@ -90,17 +90,6 @@ def read_camera(path: Path) -> CameraFile:
     return check_model(CameraFile, read_toml(path, WHAT), path)
 
 
-def parse_camera(text: str, path: Path) -> CameraFile:
-    """The same from its text; `path` is only for messages.
-
-    Raises
-    ------
-    WildlabError
-        Where it is not TOML, or a key is unknown, missing or wrong.
-    """
-    return check_model(CameraFile, parse_toml(text, path), path)
-
-
 #: Focal lengths and principal points that differ by no more than this share of the focal length are the same.
 SAME_CAMERA = 1e-3
 Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel
 
 from wildlab.errors import WildlabError
-from wildlab.flight.calibration_files import parse_camera, read_learnt, refuse_other_camera
+from wildlab.flight.calibration_files import read_camera, read_learnt, refuse_other_camera
 from wildlab.flight.checks.check import find
 from wildlab.flight.clocks import between, poses_at
 from wildlab.flight.files import TOML_LIMIT, check_model, inside
@@ -197,8 +197,8 @@ def _camera(recipe: Recipe, raw: RawFiles) -> CameraPart | None:
         own file is missing or wrong.
     """
     if recipe.camera_file is not None:
-        text = raw.read(recipe.camera_file, "camera", TOML_LIMIT).decode("utf-8", errors="replace")
-        return parse_camera(text, raw.folder / recipe.camera_file).camera
+        raw.read(recipe.camera_file, "camera", TOML_LIMIT)
+        return read_camera(raw.folder / recipe.camera_file).camera
     block = recipe.camera
     if block is None:
         return None

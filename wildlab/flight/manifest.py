@@ -701,17 +701,6 @@ def read_manifest(path: Path) -> Manifest:
     return make_manifest(read_toml(path, "the manifest of a flight", fix), path)
 
 
-def parse_manifest(text: str, path: Path) -> Manifest:
-    """The manifest in the text of a `flight.toml`; `path` is only for messages.
-
-    Raises
-    ------
-    WildlabError
-        Where it is not TOML, or a key is unknown, missing or wrong.
-    """
-    return make_manifest(parse_toml(text, path), path)
-
-
 def manifest_toml(manifest: Manifest) -> str:
     """The manifest as TOML text, every value written out, defaults too.
 

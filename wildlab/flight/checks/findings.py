@@ -677,8 +677,4 @@ def axes_words(M: Array) -> str:
 
 def rotations_of_axes() -> list[Array]:
     """The 24 rotations that take axes to axes, (3, 3) each, the identity first."""
-    found: dict[bytes, Array] = {}
-    for turns in product(range(4), repeat=3):
-        R = np.round(euler_to_matrix(*(np.pi / 2 * np.array(turns)))) + 0.0
-        found.setdefault(R.tobytes(), R)
-    return list(found.values())
+    return [np.eye(3), *(M for M in other_axes() if np.linalg.det(M) > 0)]

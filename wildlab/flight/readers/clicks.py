@@ -131,13 +131,8 @@ def sizes_beside(folder: Path, names: Iterable[str]) -> dict[str, tuple[float, f
     dict
         By those names that an image was found for.
     """
-    parts = folder.parts
-    above = [
-        Path(*parts[:at], "images", *parts[at + 1 :])
-        for at in range(len(parts) - 1, max(len(parts) - 4, 0), -1)
-        if parts[at] == "labels"
-    ]
-    every = dict.fromkeys([folder, folder / "images", folder.parent / "images", *above])
+    swapped = Path(*("images" if one == "labels" else one for one in folder.parts))
+    every = dict.fromkeys([folder, folder / "images", folder.parent / "images", swapped])
     places = [one for one in every if one.is_dir()]
     listed: dict[str, Path] = {}
     for place in reversed(places):
