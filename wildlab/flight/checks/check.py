@@ -13,7 +13,16 @@ from wildlab.flight.checks.camera import ground, image, lens, terrain_findings
 from wildlab.flight.checks.findings import Finding, Level, report_alone, say
 from wildlab.flight.checks.inertial import inertial, turning, why_no_start
 from wildlab.flight.checks.known_points import known_points
-from wildlab.flight.checks.motion import leaps, motion, origin, positions, together, without_leaps
+from wildlab.flight.checks.motion import (
+    CLOCKS,
+    LARGE_M,
+    leaps,
+    motion,
+    origin,
+    positions,
+    together,
+    without_leaps,
+)
 from wildlab.flight.checks.sensors import scans, sensors, targets
 from wildlab.flight.checks.tables import (
     bounds,
@@ -43,7 +52,7 @@ Question = Callable[[Flight], Iterator[Finding]]
 
 class Meaning(NamedTuple):
     """A question about meaning, the questions without whose findings it is asked, and whether leaps of a
-    position, which a clock would seem to explain, are taken off first."""
+    position are taken off where it would blame a clock, or they are large."""
 
     ask: Question
     unless: tuple[Question, ...] = ()
@@ -119,10 +128,14 @@ def contradictions(flight: Flight) -> list[Finding]:
     """Everything in which a flight contradicts itself, with what follows from another one."""
     found: dict[Question, list[Finding]] = {}
     without, leapt = without_leaps(flight)
+    named = [one for one in leapt if np.linalg.norm(one.by) > LARGE_M]
     for ask, unless, smooth in MEANINGS:
-        if not any(found.get(other) for other in unless):
-            found[ask] = list(ask(without if smooth else flight))
-    return [*leaps(leapt), *(finding for some in found.values() for finding in some)]
+        if any(found.get(other) for other in unless):
+            continue
+        found[ask] = list(ask(without if smooth and named else flight))
+        if smooth and leapt and any(cause.startswith(CLOCKS) for one in found[ask] for cause in one.causes):
+            named, found[ask] = leapt, list(ask(without))
+    return [*leaps(named), *(finding for some in found.values() for finding in some)]
 
 
 def sense_sentences(flight: Flight) -> list[str]:

@@ -313,6 +313,11 @@ STEPS, STEPS_S = 9, 3.0
 FEWEST, MOST_LEAPS = 30, 5
 
 
+#: Receivers leap by up to 20 m now and then; what is beyond this (m) is said in any case, less only where a
+#: clock would be blamed for it, by how such causes begin.
+LARGE_M, CLOCKS = 25.0, ("clock", "leap seconds")
+
+
 class Leap(NamedTuple):
     """Where a position leapt: the table (with the target, of truth), when, and by how much, (3,) m in n."""
 
