@@ -18,7 +18,6 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic
@@ -34,12 +33,13 @@ from wildlab.flight.card_items import (
     one_camera,
     search,
     source_folder,
+    span_of,
 )
 from wildlab.flight.files import dump_toml, is_safe_name, printable, read_toml
 from wildlab.flight.heights import NO_GRID, HeightPlan, HeightUse, choose_reference
 from wildlab.flight.importing import import_flight
 from wildlab.flight.manifest import CameraPart, TerrainSays
-from wildlab.flight.readers.log import Stream
+from wildlab.flight.readers.log import PARTS, Stream
 from wildlab.flight.store import Flight
 from wildlab.paths import DATA
 
@@ -106,7 +106,7 @@ class Proposal:
     source
         The folder that all names are below.
     choices
-        From `roles.choose_roles`.
+        From `choose_roles`.
     wishes
         What the user states.
 
@@ -512,19 +512,21 @@ def _refuse_without_zone(choices: Sequence[Choice]) -> None:
         return
     for one in choices:
         if one.role == "nothing" and "without a zone" in one.why:
-            raise WildlabError(
-                f"the clock of {one.item.shown} is local time of no stated zone",
-                f"state it, as --zone Europe/Oslo, or leave it out: --role {one.item.name}=nothing",
-                field="--zone",
-            )
+            raise _no_zone(one)
+
+
+def _no_zone(choice: Choice) -> WildlabError:
+    return WildlabError(
+        f"the clock of {choice.item.shown} is local time of no stated zone",
+        f"state it, as --zone Europe/Oslo, or leave it out: --role {choice.item.name}=nothing",
+        field="--zone",
+    )
 
 
 def _no_utc(choice: Choice) -> WildlabError:
     """What to state of a log that does not know UTC."""
-    clock = choice.item.log.clock if choice.item.log is not None else None
-    if clock is not None and "zone" in clock.base:
-        problem = f"the clock of {choice.item.shown} is local time of no stated zone"
-        return WildlabError(problem, "state it, as --zone Europe/Oslo", field="--zone")
+    if choice.item.log is not None and "zone" in choice.item.log.clock:
+        return _no_zone(choice)
     problem = f"the clock of {choice.item.shown} does not know UTC"
     return WildlabError(
         problem, "state when it stood at zero, as --start 2026-05-01T06:00:00Z", field="--start"
@@ -674,16 +676,10 @@ def read_card(
     ----------
     paths
         Files and folders: raw logs, folders of images, a whole memory card. Only read.
-    wishes
-        What the user states.
-    roles
-        Name of a file below the common folder -> role, see `roles.choose_roles`.
+    wishes, roles
+        As for `Proposal` and `choose_roles`.
     tell
         Called with the name of each file before it is read.
-
-    Returns
-    -------
-    Proposal
 
     Raises
     ------
@@ -724,16 +720,8 @@ def import_card(
     ----------
     card
         From `read_card`.
-    into
-        Folder of the flight.
-    overwrite
-        Whether a flight and a recipe that are there may be replaced.
-    calibration, terrain
+    into, overwrite, calibration, terrain
         As for `import_flight`.
-
-    Returns
-    -------
-    Flight
 
     Raises
     ------
@@ -769,20 +757,12 @@ def rows_of(choices: Sequence[Choice]) -> list[list[str]]:
 
 def _row(choice: Choice) -> list[str]:
     found, role = choice.item, choice.role + (f" {choice.target}" if choice.target else "")
-    times = np.concatenate([np.empty(0), *map(_times, [] if found.log is None else found.log.parts.values())])
+    spans = [span for part in PARTS if (span := span_of(found, [part]))]
     begins = lasts = ""
-    if len(times):
-        begins = datetime.fromtimestamp(float(times.min()), UTC).strftime("%Y-%m-%d %H:%M:%S")
-        lasts = f"{np.ptp(times):.0f} s"
+    if spans:
+        first, last = min(one[0] for one in spans), max(one[1] for one in spans)
+        begins, lasts = f"{datetime.fromtimestamp(first, UTC):%Y-%m-%d %H:%M:%S}", f"{last - first:.0f} s"
     return [found.shown, found.called, begins, lasts, role]
-
-
-def _times(stream: Stream) -> NDArray[np.float64]:
-    values = stream.columns.get("time_s")
-    if values is None:
-        return np.empty(0)
-    used = np.asarray(values[stream.used], float)
-    return np.asarray(used[np.isfinite(used)])
 
 
 def sentences_of(choices: Sequence[Choice]) -> list[str]:

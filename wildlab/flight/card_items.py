@@ -67,6 +67,11 @@ class CardItem:
     problem: str = ""
 
     @property
+    def key(self) -> str:
+        """What tells it from others: a folder may hold images, and pixels of things in them."""
+        return self.name + self.format
+
+    @property
     def shown(self) -> str:
         """The name as it is told."""
         return "the folder itself" if self.name == "." else printable(self.name)
@@ -210,7 +215,9 @@ def _read(path: Path, name: str, folder: str, zone: str | None) -> CardItem:
             return CardItem(name, format_, read_folder(path, format_, zone)[0])
         return CardItem(name, format_, read_log(path, read_regular(path, RAW_LIMIT), format_, zone))
     except WildlabError as error:
-        return CardItem(name, format_, problem=_why(error))
+        return CardItem(
+            name, format_, problem=f"{error.problem}; {error.fix}" if error.fix else error.problem
+        )
 
 
 def _unknown(head: bytes) -> str:
@@ -218,11 +225,6 @@ def _unknown(head: bytes) -> str:
         recipe = "a recipe says what its columns are (data/recipes/README.md, which `wildlab doctor` finds)"
         return f"a plain table: {recipe}; then wildlab import recipe.toml --source FOLDER"
     return "is empty" if not head else "no reader knows this format"
-
-
-def _why(error: WildlabError) -> str:
-    """Why a file could not be read, and what to do."""
-    return f"{error.problem}; {error.fix}" if error.fix else error.problem
 
 
 # -- roles
@@ -273,7 +275,7 @@ def choose_roles(found: Sequence[CardItem], stated: Mapping[str, str]) -> list[C
     Parameters
     ----------
     found
-        From `found.search`.
+        From `search`.
     stated
         Name of a file or folder -> role, as `ROLES` names them; ``target:NAME`` names the target too. These
         are not argued with.
@@ -289,20 +291,20 @@ def choose_roles(found: Sequence[CardItem], stated: Mapping[str, str]) -> list[C
         Where a role or a name that is stated is not known, or two are stated to be the vehicle's own log.
     """
     given = _stated(found, stated)
-    choices = {one.name + one.format: _first(one, given.get(one.name)) for one in found}
+    choices = {one.key: _first(one, given.get(one.name)) for one in found}
     for one, whole in _copies([one for one in found if one.name not in given]):
-        choices[one.name + one.format] = Choice(one, "nothing", f"all that is in it is in {whole.shown} too")
-    open_ = [one for one in found if one.name not in given and choices[one.name + one.format].role == ""]
+        choices[one.key] = Choice(one, "nothing", f"all that is in it is in {whole.shown} too")
+    open_ = [one for one in found if one.name not in given and choices[one.key].role == ""]
     own = next((one.item for one in choices.values() if one.role == "own"), None)
     images = _images(found, choices)
     if own is None and open_:
         own, why = _own(open_, images)
         if own is not None:
-            choices[own.name + own.format] = Choice(own, "own", why)
+            choices[own.key] = Choice(own, "own", why)
     for one in open_:
         if one is not own:
-            choices[one.name + one.format] = _other(one, own, images)
-    return _named([choices[one.name + one.format] for one in found])
+            choices[one.key] = _other(one, own, images)
+    return _named([choices[one.key] for one in found])
 
 
 def _copies(found: Sequence[CardItem]) -> Iterator[tuple[CardItem, CardItem]]:
@@ -386,7 +388,7 @@ def _useless(one: CardItem) -> str:
 
 def _images(found: Sequence[CardItem], choices: Mapping[str, Choice]) -> CardItem | None:
     """The folder with the most images."""
-    folders = [one for one in found if choices[one.name + one.format].role == "images"]
+    folders = [one for one in found if choices[one.key].role == "images"]
     return max(folders, key=lambda one: len(one.log.parts["photos"]) if one.log else 0, default=None)
 
 
@@ -400,8 +402,6 @@ def _own(open_: Sequence[CardItem], images: CardItem | None) -> tuple[CardItem |
             distance, above = _from_images(one, images)
             if _on_board(distance, above):
                 return one, f"it is mostly within {distance:.1f} m of the images"
-        return None, ""
-    if not open_:
         return None, ""
     if len(open_) == 1:
         return open_[0], "it is the only log"
@@ -684,20 +684,9 @@ def one_camera(
 def camera_of_images(
     images: CardItem, stated: CameraPart | None, focal_px: float | None = None
 ) -> tuple[CameraPart | None, str]:
-    """The camera that took the images and how it is known; or None and why it is not.
+    """The camera that took the images and how it is known, in a clause; or None and why it is not.
 
-    Parameters
-    ----------
-    images
-        With the part ``photos``.
-    stated
-        By the user, which counts for more than the tags.
-    focal_px
-        Likewise, where the rest of the camera is to be that of the images.
-
-    Returns
-    -------
-    camera, and a clause
+    What the user states, the camera or its focal length alone, counts for more than the tags.
     """
     if images.log is None:
         return None, images.problem
@@ -743,25 +732,10 @@ def clock_of_images(
 ) -> ImageClock:
     """How the images meet the vehicle's log.
 
-    By records of their triggers; by UTC where they have it; else by the only whole number of quarters of an
-    hour that brings their camera's wall clock into the flight.
-
-    Parameters
-    ----------
-    images
-        With the part ``photos``.
-    own
-        The vehicle's own log.
-    stated_offset_s
-        What to add to the stamps, where the user states it.
-    triggers
-        Name of the recipe's table of triggers, and its rows, where there is one.
-    others
-        Tracks of targets: where the vehicle has no log, they say when the flight was.
-
-    Returns
-    -------
-    ImageClock
+    By records of their triggers (the recipe's table of them, by name, and its rows); by UTC where they have
+    it; else by the only whole number of quarters of an hour that brings their camera's wall clock into the
+    flight, which ``others``, tracks of targets, know where the vehicle has no log. What the user states to be
+    added to the stamps counts for more.
     """
     photos = images.part("photos")
     columns: dict[str, NDArray[Any]] = {} if photos is None else photos.columns
@@ -774,7 +748,7 @@ def clock_of_images(
         return ImageClock("sequence", 0.0, "The images have no time.")
     offset = stated_offset_s or 0.0
     if len(utc):
-        base = images.log.clock.base if images.log is not None and images.log.clock is not None else ""
+        base = images.log.clock if images.log is not None else ""
         note = f"The images' stamps are {printable(base) if base.startswith('local') else 'in UTC'}."
         note += f" {offset:g} s are added to them, as you said." if offset else ""
         return ImageClock("utc", offset, note)

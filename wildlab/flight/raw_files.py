@@ -156,24 +156,18 @@ def read_matlab(path: Path, data: bytes) -> dict[str, Any]:
     WildlabError
         Where it is of another format, damaged, or too large.
     """
+    remedy = "save it in MATLAB with -v7"
     if data[:8] == _HDF5 or data[512:520] == _HDF5 or data[:10] == b"MATLAB 7.3":
-        raise WildlabError(
-            "is of version 7.3 (HDF5), which is not read",
-            "save it in MATLAB with -v7",
-            file=path,
-        )
+        raise WildlabError("is of version 7.3 (HDF5), which is not read", remedy, file=path)
     if data[:10] != b"MATLAB 5.0" or len(data) < _HEADER or data[126:128] not in (b"IM", b"MI"):
-        raise WildlabError("is no MATLAB file of version 5 to 7", "save it in MATLAB with -v7", file=path)
+        raise WildlabError("is no MATLAB file of version 5 to 7", remedy, file=path)
     try:
         size = _unpacked(data)
     except (zlib.error, struct.error) as error:
         raise _damaged(path, error) from None
     if size > MOST_BYTES:
-        raise WildlabError(
-            f"holds more than {MOST_BYTES >> 20} MiB once it is unpacked",
-            "save only what the recipe needs",
-            file=path,
-        )
+        problem = f"holds more than {MOST_BYTES >> 20} MiB once it is unpacked"
+        raise WildlabError(problem, "save only what the recipe needs", file=path)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -598,10 +592,7 @@ def plain_numbers(table: RawTable, column: str, part: str, *, may_be_empty: bool
     if bad.any():
         row = int(np.argmax(bad))
         cell = table.cell(column, row)
-        problem, fix = (
-            "is not a finite number",
-            "mend the cell, or take the row out",
-        )
+        problem, fix = "is not a finite number", "mend the cell, or take the row out"
         if _DECIMAL_COMMA.fullmatch(cell):
             problem, fix = "has a decimal comma", "write `decimal = ','` beside file"
         raise table.fail(f"{_short(cell)} {problem}", fix, column, part, row)

@@ -22,7 +22,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.clock_fitting import fit_steady, week_to_utc
+from wildlab.flight.clock_fitting import ClockFit, fit_steady, week_to_utc
 from wildlab.flight.readers.log import (
     ANGLES,
     CUT_OFF,
@@ -33,7 +33,6 @@ from wildlab.flight.readers.log import (
     VELOCITY,
     WORLD,
     Array,
-    Clock,
     Columns,
     Mask,
     Messages,
@@ -423,7 +422,7 @@ class ArdupilotLog(NamedTuple):
     receiver: MessageTable | None
     rows: NDArray[np.int64]
     stamps: Array
-    clock: Clock | None
+    fit: ClockFit | None
 
     def sensors(self, *names: str) -> list[MessageTable]:
         """One table per sensor, of messages by these names, in their order."""
@@ -444,9 +443,7 @@ class ArdupilotLog(NamedTuple):
 
     def utc(self, stamps: Array) -> Array:
         """(N,) s since 1970 of stamps; NaN where UTC is not known."""
-        if self.clock is None or not self.clock.base:
-            return np.full(len(stamps), np.nan)
-        return np.asarray(self.clock.offset_s + self.clock.rate * stamps)
+        return np.full(len(stamps), np.nan) if self.fit is None else self.fit.to_reference(stamps)
 
     def readings(
         self, table: MessageTable, columns: dict[str, Array], unusable: dict[str, Mask] | None = None
@@ -513,7 +510,8 @@ def _decoded(
     said = [text for name, field in (("VER", "FWS"), ("MSG", "Message")) if name in tables
             for text in tables[name].texts(field)]  # fmt: skip
     vehicle = next((match.group() for text in (*said, title) if (match := _VEHICLE.search(text))), "")
-    return RawLog(parts, vehicle, log.clock, told(*lost, *left_out), _notes(log, parts, receivers, place))
+    clock = "GPS weeks" if log.fit else ""
+    return RawLog(parts, vehicle, clock, told(*lost, *left_out), _notes(log, parts, receivers, place))
 
 
 # -- times
@@ -561,13 +559,12 @@ def _clocked(tables: dict[str, MessageTable], counted_in: str) -> tuple[Ardupilo
     if anchor is None:
         return log, receivers
     kept = in_order(anchor[1])
-    log = log._replace(rows=anchor[0].rows[kept], stamps=anchor[1][kept], clock=Clock(""))
+    log = log._replace(rows=anchor[0].rows[kept], stamps=anchor[1][kept])
     if receiver is not None:
         own, utc, fixed = log.of(receiver), gps_utc(receiver), _true_fix(receiver)
         pairs = in_order(own, fixed) & in_order(utc, fixed)
         if pairs.any():
-            fit = fit_steady(own[pairs], utc[pairs], resolution_s=LOOP_S)
-            log = log._replace(clock=Clock.fitted("GPS weeks", fit))
+            log = log._replace(fit=fit_steady(own[pairs], utc[pairs], resolution_s=LOOP_S))
     return log, receivers
 
 
@@ -690,9 +687,9 @@ def _place_of(name: str, log: ArdupilotLog) -> PlaceTrack | None:
 
 def _place_of_gnss(gnss: Stream, receiver: MessageTable, log: ArdupilotLog) -> PlaceTrack | None:
     """Positions of the satellite receiver; heights above home where its messages have the autopilot's."""
-    stamps, clock = gnss.columns["time_log_s"], log.clock
-    if clock is not None and clock.base:
-        stamps = (gnss.columns["time_s"] - clock.offset_s) / clock.rate
+    stamps = gnss.columns["time_log_s"]
+    if log.fit is not None:
+        stamps = (gnss.columns["time_s"] - log.fit.offset_s) / log.fit.rate
     used = usable("gnss", gnss) & np.isfinite(stamps)
     columns = {one: gnss.columns[one][used] for one in _PLACE[:3]}
     columns["height_home_m"] = receiver.get("RelAlt", "RAlt")[used]
@@ -782,16 +779,17 @@ def _imu(log: ArdupilotLog) -> Stream | None:
 def _notes(
     log: ArdupilotLog, parts: dict[str, Stream], receivers: list[MessageTable], place: PlaceTrack | None
 ) -> list[str]:
-    clock, receiver = log.clock, next((i for i, one in enumerate(receivers, 1) if one is log.receiver), 0)
+    stamped = len(log.rows)
+    receiver = next((i for i, one in enumerate(receivers, 1) if one is log.receiver), 0)
     unstamped = [
         one
         for one in ("GPS", "ATT", "IMU", "CAM", "TRIG")
-        if clock is not None and one in log.tables and own_stamps(log.tables[one]) is None
+        if stamped and one in log.tables and own_stamps(log.tables[one]) is None
     ]
     notes = {
         f"messages {', '.join(unstamped)} have no stamps: times are those around them": unstamped,
-        "its messages have no stamps": clock is None,
-        "no satellite fix tells UTC": clock is not None and not clock.base,
+        "its messages have no stamps": not stamped,
+        "no satellite fix tells UTC": stamped and log.fit is None,
         f"positions of poses are those of messages {place and place.name}": "poses" in parts and place,
         f"of {len(receivers)} satellite receivers number {receiver} is used": len(receivers) > 1,
         "heights of CAM are left out: nothing says what they count from": (

@@ -29,10 +29,10 @@ from wildlab.flight.clock_fitting import WEEK_S, ClockFit, fit_clock, wall_to_ut
 from wildlab.flight.readers.log import (
     ANGLES,
     PLACE,
+    UTC_OF_LOG,
     VELOCITY,
     WORLD,
     Array,
-    Clock,
     Mask,
     RawLog,
     Stream,
@@ -108,7 +108,7 @@ def srt_decode(path: Path, data: bytes, zone: str | None) -> RawLog:
     columns = {str(name): one.to_numpy(float) for name, one in table.items()}
     times, clock, reasons = _times(columns["code"], columns["wall"], zone)
     notes = {
-        "it has no clock: stamps count from the beginning of the video": clock is None,
+        "it has no clock: stamps count from the beginning of the video": not clock,
         "its clock is local time without a zone: state the zone": NO_ZONE in reasons,
         "altitude is taken as height above take-off": columns["vague"].any(),
     }
@@ -179,19 +179,16 @@ def _wall(found: re.Match[str] | None) -> float:
     return calendar_s(*found.groups()[:6]) + int(digits) * 1e-6
 
 
-def _times(
-    code: Array, wall: Array, zone: str | None
-) -> tuple[dict[str, Array], Clock | None, dict[str, Mask]]:
+def _times(code: Array, wall: Array, zone: str | None) -> tuple[dict[str, Array], str, dict[str, Mask]]:
     none = np.full(len(wall), np.nan)
     clocked = np.isfinite(wall)
     if not clocked.any():
-        return {"time_s": none, "time_log_s": code}, None, {}
+        return {"time_s": none, "time_log_s": code}, "", {}
     if zone is None:
         times = {"time_s": none, "time_log_s": wall}
-        return times, Clock(NO_ZONE, pairs=int(clocked.sum())), {NO_ZONE: clocked, "no time": ~clocked}
+        return times, NO_ZONE, {NO_ZONE: clocked, "no time": ~clocked}
     utc = wall_to_utc(wall, zone)
-    clock = Clock.shifted(f"wall clock of zone {zone[:60]}", wall, utc)
-    return {"time_s": utc, "time_log_s": wall}, clock, {}
+    return {"time_s": utc, "time_log_s": wall}, f"wall clock of zone {zone[:60]}", {}
 
 
 # -- records of images
@@ -245,7 +242,7 @@ def mrk_decode(path: Path, data: bytes, zone: str | None) -> RawLog:
     }
     return RawLog(
         {"triggers": Stream(columns, [at for at, _ in found], "line")},
-        clock=Clock.shifted("GPS weeks", columns["time_log_s"], time),
+        clock="GPS weeks",
         lost=told((len(lines) - len(found), "line", f"of {len(lines)} could not be read")),
         notes=["places are those of the camera, not the antenna"],
     )
@@ -294,7 +291,6 @@ _COLUMNS = {
 }
 #: A gimbal that keeps its heading within this, while the aircraft turns by more than that, degrees.
 _STILL_DEG, _TURNED_DEG = 2.0, 45.0
-UTC_BASE = "UTC of the log"
 #: The counter and the clock part by more than this in a pause only, s; fewer changes of second make no fit.
 _PAUSE_S, _FEW = 1.5, 10
 
@@ -330,11 +326,11 @@ def airdata_decode(path: Path, data: bytes, zone: str | None) -> RawLog:
     whole = np.array([known[one] for one in clocks])
     notes: list[str] = []
     own = columns.get("time_log_s", np.full(len(whole), np.nan))
-    time, clock = _fraction(own, whole, notes)
+    time = _fraction(own, whole, notes)
     times = {"time_s": time, "time_log_s": own if np.isfinite(own).any() else whole}
     return RawLog(
         _parts(times, columns, np.array(table.lines), notes),
-        clock=clock,
+        clock=UTC_OF_LOG if np.isfinite(whole).any() else "",
         lost=told(table.lost()),
         notes=notes,
     )
@@ -398,17 +394,17 @@ def _unit(path: Path, ours: str, column: tuple[str, str]) -> float:
     return _UNITS[unit]
 
 
-def _fraction(own: Array, whole: Array, notes: list[str]) -> tuple[Array, Clock | None]:
+def _fraction(own: Array, whole: Array, notes: list[str]) -> Array:
     """Stamps in whole seconds made finer by a counter: where a second changes, it has just begun."""
     both = np.flatnonzero(np.isfinite(own) & np.isfinite(whole))
     if not np.isfinite(whole).any():
-        return whole, None
+        return whole
     changes = np.flatnonzero(np.diff(whole[both]) > 0)
     before, after = both[changes], both[changes + 1]
     near = (own[after] > own[before]) & (own[after] - own[before] < 1.0)
     before, after = before[near], after[near]
     if len(after) < 3 or (whole[both] % 1 > 0).any():
-        return whole, Clock(UTC_BASE, pairs=len(both))
+        return whole
     reference, middle = whole[after], (own[before] + own[after]) / 2
     # Nothing but a pause, or a wrong row, parts the two by more than the second that one of them is coarse.
     lack = (whole - own)[both]
@@ -429,11 +425,4 @@ def _fraction(own: Array, whole: Array, notes: list[str]) -> tuple[Array, Clock 
             f"the counter of milliseconds stood still {plural(len(stood), 'time')}, "
             f"{sum(stood):.1f} s together: each stretch has its own fit"
         )
-    if not fits:
-        return time, Clock(UTC_BASE, spread_s=1 / np.sqrt(12), largest_s=0.5, pairs=len(both))
-    left = np.concatenate([one.residual[one.used] for one in fits])
-    fit = max(fits, key=lambda one: int(one.used.sum()))
-    spread = max(one.spread_s for one in fits)
-    return time, Clock(
-        UTC_BASE, fit.rate, fit.offset_s, spread, float(np.abs(left).max()), len(left), fit.rate_sd
-    )
+    return time

@@ -9,16 +9,15 @@ strictly increase.
 
 from __future__ import annotations
 
-import math
 from bisect import bisect_left
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.flight.clock_fitting import GPS_START_S, ClockFit
+from wildlab.flight.clock_fitting import GPS_START_S
 from wildlab.flight.clocks import between
 from wildlab.flight.readers.text import LATEST_S, decode, plural
 from wildlab.flight.schema import BOUNDS
@@ -66,8 +65,8 @@ PARTS: dict[str, tuple[str, ...]] = {
     ),
     # Images with what stands in them; `time_log_s` is the camera's own wall clock as if it were UTC.
     "photos": (
-        *("file", *PLACE, *ANGLES, *WORLD, "sd_horizontal_m", "sd_vertical_m", "fix"),
-        *("width_px", "height_px", "focal_mm", "focal_px", "focal_35mm", "focal_from", "camera"),
+        *("file", *PLACE, *ANGLES, *WORLD, "sd_horizontal_m", "sd_vertical_m"),
+        *("width_px", "height_px", "focal_px", "focal_from", "camera"),
     ),
     # Surveyed points that do not move.
     "marks": ("name", *PLACE, "sd_horizontal_m", "sd_vertical_m"),
@@ -77,49 +76,10 @@ PARTS: dict[str, tuple[str, ...]] = {
         *("box_u_px", "box_v_px", "box_width_px", "box_height_px"),
     ),
 }
+#: What UTC was known from where rows state it.
+UTC_OF_LOG = "UTC of the log"
 #: Columns of text; all others are numbers.
 TEXTS = frozenset({"why", "file", "camera", "focal_from", "name", "image"})
-
-
-class Clock(NamedTuple):
-    """How the log's own stamps were brought to UTC.
-
-    Attributes
-    ----------
-    base
-        What UTC was known from, in a clause: ``"GPS weeks"``, ``"GPS time of messages GPS"``, ``"times of
-        receipt"``, ``"UTC of the log"``, ``"local time without a zone"``; ``""`` where it was not.
-    rate
-        Seconds of UTC for a second of the log's clock.
-    offset_s
-        UTC of the log's zero, s since 1970.
-    spread_s, largest_s
-        Robust standard deviation and largest absolute value of what is left over.
-    pairs
-        From how many pairs of stamps.
-    rate_sd
-        Standard deviation of the rate; NaN where it was not estimated, or taken for 1.
-    """
-
-    base: str
-    rate: float = 1.0
-    offset_s: float = 0.0
-    spread_s: float = 0.0
-    largest_s: float = 0.0
-    pairs: int = 0
-    rate_sd: float = math.nan
-
-    @classmethod
-    def fitted(cls, base: str, fit: ClockFit) -> Clock:
-        """As a fit of pairs of stamps has it."""
-        left = float(np.abs(fit.residual[fit.used]).max())
-        return cls(base, fit.rate, fit.offset_s, fit.spread_s, left, int(fit.used.sum()), fit.rate_sd)
-
-    @classmethod
-    def shifted(cls, base: str, own: Array, utc: Array) -> Clock | None:
-        """As pairs of stamps (N,) have it whose rate is 1, by their median; None where there is none."""
-        apart = (utc - own)[np.isfinite(utc - own)]
-        return cls(base, offset_s=float(np.median(apart)), pairs=len(apart)) if len(apart) else None
 
 
 def named(names: Iterable[str], values: Iterable[Any]) -> dict[str, Any]:
@@ -193,7 +153,8 @@ class RawLog:
     vehicle
         What it says of what carried it, in its words: ``"ArduCopter V3.1.3"``. Empty: nothing.
     clock
-        How its stamps became UTC; None where it has none that run.
+        What UTC was known from, in a clause: ``"GPS weeks"``, ``"times of receipt"``, ``"local time without a
+        zone"``; empty where it was not.
     lost
         Sentences on what could not be read, each with how much of it.
     notes
@@ -202,7 +163,7 @@ class RawLog:
 
     parts: dict[str, Stream]
     vehicle: str = ""
-    clock: Clock | None = None
+    clock: str = ""
     lost: Sequence[str] = ()
     notes: Sequence[str] = ()
 

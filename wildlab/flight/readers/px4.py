@@ -29,7 +29,6 @@ from wildlab.flight.readers.log import (
     VELOCITY,
     WORLD,
     Array,
-    Clock,
     Messages,
     RawLog,
     Stream,
@@ -117,7 +116,7 @@ def decode(path: Path, data: bytes, zone: str | None) -> RawLog:
         CUT_OFF: cut,
         "UTC is not known: times count from the start of the system": log.fit is None,
     }
-    clock = Clock("") if log.fit is None else Clock.fitted("UTC of the receiver", log.fit)
+    clock = "UTC of the receiver" if log.fit else ""
     return RawLog(parts, _vehicle(ulog.msg_info_dict), clock, notes=notes + holding(said))
 
 

@@ -30,7 +30,6 @@ from wildlab.flight.readers.log import (
     VELOCITY,
     WORLD,
     Array,
-    Clock,
     Mask,
     Messages,
     RawLog,
@@ -202,14 +201,14 @@ class Boot(NamedTuple):
     """Runs of a vehicle from one start to the next, each with its clock.
 
     `first` (S,): number of the frame that each begins with. `rate`, `offset_s` (S,): to UTC. `behind_s` (S,):
-    middle of what receipts are behind UTC. `clock`: of the longest run. `notes`: sentences.
+    middle of what receipts are behind UTC. `clock`: as of the longest run. `notes`: sentences.
     """
 
     first: Array
     rate: Array
     offset_s: Array
     behind_s: Array
-    clock: Clock
+    clock: str
     notes: list[str]
 
     def utc(self, boot_s: Array, found: Messages) -> tuple[Array, Mask]:
@@ -264,8 +263,7 @@ def find_boot(frames: Telemetry, system: int, component: int) -> Boot | None:
         f"the vehicle was switched on {len(starts)} times; each run has a clock of its own": len(starts) > 1,
         "the vehicle's stamps are of several clocks": falls >= MOST_RUNS,
     }
-    clock = Clock.fitted(base, fits[main])
-    return Boot(number[starts], rate, offset_s, behind, clock, holding(notes))
+    return Boot(number[starts], rate, offset_s, behind, base, holding(notes))
 
 
 class Vehicle(NamedTuple):
@@ -349,7 +347,7 @@ def decode(path: Path, data: bytes, zone: str | None) -> RawLog:
     if stations:
         said = ", ".join(map(str, sorted(stations)))
         notes = [*notes, f"left out as no vehicles: system {said}"]
-    clock, before = (vehicle.boot.clock, vehicle.boot.notes) if vehicle.boot else (None, [])
+    clock, before = (vehicle.boot.clock, vehicle.boot.notes) if vehicle.boot else ("", [])
     return RawLog(parts, _called(vehicle), clock, frames.lost, [*before, *notes])
 
 

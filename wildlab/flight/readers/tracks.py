@@ -32,16 +32,15 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.clock_fitting import GPS_START_S, WEEK_S, fit_clock, gps_to_utc, week_to_utc
+from wildlab.flight.clock_fitting import GPS_START_S, WEEK_S, gps_to_utc, week_to_utc
 from wildlab.flight.readers import text
 from wildlab.flight.readers.log import (
+    UTC_OF_LOG,
     VELOCITY,
     Array,
-    Clock,
     Mask,
     RawLog,
     Stream,
-    any_of,
     holding,
     level_velocity,
     named,
@@ -146,7 +145,7 @@ def nmea_decode(path: Path, data: bytes, zone: str | None) -> RawLog:
     columns = {"time_s": utc, "time_log_s": place["time"].to_numpy(float), **_columns(found)}
     return RawLog(
         {"gnss": Stream(columns, place["line"], "line", {"no fix": found["no_fix"]})},
-        clock=Clock("UTC of the log", pairs=timed) if timed else None,
+        clock=UTC_OF_LOG if timed else "",
         lost=told((bad, "sentence", "with a wrong or missing checksum")),
         notes=holding(notes),
     )
@@ -378,11 +377,9 @@ def ubx_decode(path: Path, data: bytes, zone: str | None) -> RawLog:
     poses = _poses(found, gnss)
     begins, ends = np.r_[found.start, len(data)].tolist(), np.r_[0, found.stop].tolist()
     rest = b"".join(data[i:j] for i, j in zip(ends, begins, strict=True))
-    own, time = gnss.columns["time_log_s"], gnss.columns["time_s"]
-    known = np.isfinite(own * time) & ~any_of(gnss.unusable.values(), len(own))
     return RawLog(
         {"gnss": gnss} | ({"poses": poses} if poses else {}),
-        clock=Clock.fitted("UTC of the log", fit_clock(own[known], time[known])) if known.any() else None,
+        clock=UTC_OF_LOG,
         lost=told((len(rest.translate(None, _TEXT)), "byte", "of no message of UBX and of no text")),
     )
 
@@ -535,7 +532,7 @@ def gpx_decode(path: Path, data: bytes, zone: str | None) -> RawLog:
     return _in_order_of_time(
         RawLog(
             {"gnss": Stream(columns, None, "point")},
-            clock=Clock("UTC of the log", pairs=timed) if timed else None,
+            clock=UTC_OF_LOG if timed else "",
             lost=told((broken, "point", f"of {len(pieces)} could not be read")),
             notes=[] if timed else notes,
         )
@@ -546,7 +543,7 @@ def _in_order_of_time(found: RawLog) -> RawLog:
     """Some programs write the newest track first."""
     part = found.parts["gnss"]
     time = part.columns["time_s"]
-    if found.clock is None or not (np.diff(time) < 0).any():
+    if not found.clock or not (np.diff(time) < 0).any():
         return found
     order = np.argsort(time, kind="stable")
     rows = (1 + np.arange(len(time)) if part.rows is None else np.asarray(part.rows))[order]
@@ -657,11 +654,10 @@ def pos_decode(path: Path, data: bytes, zone: str | None) -> RawLog:
         "v_down_m_s": -of("vu"),
         "fix": fix,
     }
-    base = "GPS time of the rows" if scale == "GPST" else "UTC of the log"
     return _in_order_of_time(
         RawLog(
             {"gnss": Stream(columns, [at for at, _, _ in rows], "line")},
-            clock=Clock.shifted(base, own, columns["time_s"]),
+            clock="GPS time of the rows" if scale == "GPST" else UTC_OF_LOG,
             lost=told((bad, "line", f"of {bad + len(rows)} could not be read")),
         )
     )
