@@ -35,12 +35,8 @@ class ClockFit(NamedTuple):
         s; the middle of the pairs used, so that rate and offset hardly have to do with each other.
     rate
         Seconds of the reference for a second of the clock.
-    residual
-        (N,) s, reference minus fit, NaN where a stamp was missing.
     used
         (N,) pairs that the fit rests on; the others are outliers.
-    spread_s
-        Robust standard deviation of the residuals used.
     rate_sd
         Standard deviation of ``rate``; infinite where the pairs do not tell.
     """
@@ -48,9 +44,7 @@ class ClockFit(NamedTuple):
     own_0: float
     reference_0: float
     rate: float
-    residual: Array
     used: NDArray[np.bool_]
-    spread_s: float
     rate_sd: float = np.inf
 
     def to_reference(self, own: ArrayLike) -> Array:
@@ -113,19 +107,9 @@ def fit_clock(
     line = _under(dx, dy, at_0, rate) if late else _through(dx, dy, at_0, rate, resolution_s)
     at_0, rate, used, rate_sd = line
     middle = float(dx[used].mean())
-    residual = np.full(len(x), np.nan)
-    residual[known] = dy - at_0 - rate * dx
     every = np.zeros(len(x), bool)
     every[np.flatnonzero(known)[used]] = True
-    return ClockFit(
-        x_0 + middle,
-        y_0 + at_0 + rate * middle,
-        rate,
-        residual,
-        every,
-        _scale(residual[every]),
-        rate_sd,
-    )
+    return ClockFit(x_0 + middle, y_0 + at_0 + rate * middle, rate, every, rate_sd)
 
 
 def _start(dx: Array, dy: Array) -> tuple[float, float]:
@@ -252,16 +236,7 @@ def fit_steady(
         offset = float(apart[used].min())
     else:
         offset = float(np.median(apart[used]))
-    residual = apart - offset
-    return ClockFit(
-        middle,
-        middle + offset,
-        rate,
-        residual,
-        used,
-        max(_scale(residual[used]), RESOLUTION_S),
-        fit.rate_sd,
-    )
+    return ClockFit(middle, middle + offset, rate, used, fit.rate_sd)
 
 
 #: Stamps under the line are early, and outliers, where it rises by so many of its own standard deviations
