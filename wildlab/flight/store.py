@@ -66,6 +66,7 @@ PART = "checksums"
 STATED = "locations"
 _HEADERS = {part: re.compile(rf"^[ \t]*\[[ \t]*{part}[ \t]*\].*$", re.MULTILINE) for part in (PART, STATED)}
 _NEXT = re.compile(r"^[ \t]*\[", re.MULTILINE)
+MISSING, RESTORE = "this file is missing", "restore it, or import again"
 
 
 def table_files(folder: Path) -> dict[str, Path]:
@@ -118,24 +119,14 @@ def verify(folder: Path, stated: Mapping[str, str]) -> None:
     meant = f'if it is meant: wildlab check --accept "{folder}"'
     found = checksums_of(folder)
     for name in sorted({*stated, *found} - {FILE_NAME, STATED}):
+        if found.get(name) == stated.get(name):
+            continue
+        problem, remedy = "its SHA-256 is not that in flight.toml: it was damaged or changed", RESTORE
         if name not in found:
-            raise WildlabError(
-                "this file is missing",
-                f"restore it, or import again; {meant}",
-                file=folder / name,
-            )
-        if name not in stated:
-            raise WildlabError(
-                "it has no checksum in flight.toml: it was added later",
-                f"move it elsewhere; {meant}",
-                file=folder / name,
-            )
-        if found[name] != stated[name]:
-            raise WildlabError(
-                "its SHA-256 is not that in flight.toml: it was damaged or changed",
-                f"restore it, or import again; {meant}",
-                file=folder / name,
-            )
+            problem = MISSING
+        elif name not in stated:
+            problem, remedy = "it has no checksum in flight.toml: it was added later", "move it elsewhere"
+        raise WildlabError(problem, f"{remedy}; {meant}", file=folder / name)
 
 
 def accept_changes(folder: Path) -> list[str]:
@@ -467,8 +458,7 @@ def _present(path: Path) -> None:
     try:
         regular_size(path)
     except FileNotFoundError:
-        fix = "restore it, or import again"
-        raise WildlabError("this file is missing", fix, file=path) from None
+        raise WildlabError(MISSING, RESTORE, file=path) from None
 
 
 def _read(folder: Path, name: str, table: Table) -> pd.DataFrame:
