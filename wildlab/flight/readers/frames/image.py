@@ -554,7 +554,7 @@ def decode(data: bytes) -> tuple[NDArray[Any], Unit, str] | str:
 
 
 def as_grey_or_colour(image: NDArray[Any]) -> tuple[NDArray[Any], Unit] | str:
-    """RawLog pixels with their unit: three alike colours are one.
+    """Decoded pixels with their unit: three alike colours are one.
 
     Parameters
     ----------
