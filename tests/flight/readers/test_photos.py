@@ -56,11 +56,11 @@ def test_what_a_dji_says(tmp_path):
     assert column(log, "camera") == ["DJI FC6310"] * 3
 
 
-def test_rtk_has_its_height_above_the_ellipsoid_and_its_spread(tmp_path):
+def test_rtk_has_its_height_above_the_ellipsoid_its_spread_and_fix(tmp_path):
     rtk = {"RtkFlag": 50, "RtkStdLat": 0.03, "RtkStdLon": 0.04, "RtkStdHgt": 0.05}
     more = {"GpsLatitude": "61.123456789", "GpsLongtitude": "-15.987654321"}
     row = photo(tmp_path, **made.dji(1, CalibratedFocalLength="3666.67", **rtk, **more))
-    near(row, height_ellipsoid_m=345.5, sd_horizontal_m=math.hypot(0.03, 0.04) / math.sqrt(2))
+    near(row, height_ellipsoid_m=345.5, fix=6, sd_horizontal_m=math.hypot(0.03, 0.04) / math.sqrt(2))
     # The maker's own digits, its misspelt tag too, are more than those of EXIF.
     near(row, sd_vertical_m=0.05, latitude_deg=61.123456789, longitude_deg=-15.987654321)
     camera = camera_of(read_photos(tmp_path))

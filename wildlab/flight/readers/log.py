@@ -65,7 +65,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     ),
     # Images with what stands in them; `time_log_s` is the camera's own wall clock as if it were UTC.
     "photos": (
-        *("file", *PLACE, *ANGLES, *WORLD, "sd_horizontal_m", "sd_vertical_m"),
+        *("file", *PLACE, *ANGLES, *WORLD, "sd_horizontal_m", "sd_vertical_m", "fix"),
         *("width_px", "height_px", "focal_px", "focal_from", "camera"),
     ),
     # Surveyed points that do not move.

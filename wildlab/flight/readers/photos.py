@@ -178,8 +178,8 @@ NAN = math.nan
 EARLIEST_S = 631_151_999.0
 #: Diagonal of a frame of 35 mm film, mm: what an equivalent focal length is defined by (CIPA DCG-001).
 DIAGONAL_35MM = math.hypot(36.0, 24.0)
-#: DJI's RtkFlag where the fix is by RTK: single, float, fixed.
-RTK_FIXES = (16, 32, 34, 50)
+#: Kinds of fix as MAVLink numbers them, by DJI's RtkFlag.
+RTK_FIXES = {16: 3.0, 32: 5.0, 34: 5.0, 50: 6.0}
 #: Two statements of one focal length that differ by more contradict each other.
 CONTRADICTS = 0.1
 #: Where focal lengths in px come from, best first.
@@ -280,6 +280,14 @@ def rtk_of(tags: Tags) -> int:
     """DJI's RtkFlag; -1 where there is none."""
     flag = number(tags.xmp.get("dji:RtkFlag"))
     return int(flag) if math.isfinite(flag) and 0 <= flag < 1000 else -1
+
+
+def fix_of(tags: Tags) -> float:
+    """Kind of fix; NaN where it is not said."""
+    if rtk_of(tags) in RTK_FIXES:
+        return RTK_FIXES[rtk_of(tags)]
+    mode = number(text(tags.exif.get("GPSMeasureMode")) or tags.exif.get("GPSMeasureMode"))
+    return mode if mode in (2.0, 3.0) else NAN
 
 
 def spreads_of(tags: Tags) -> tuple[float, float]:
@@ -556,6 +564,7 @@ def folder_decode(folder: Path, zone: str | None) -> RawLog:
     high = any_of([np.isfinite(columns[name]) for name in _HEIGHTS if name in columns], len(tags))
     why = [why or ("" if up else "no height") for why, up in zip(reasons, high, strict=True)]
     columns |= {
+        "fix": [fix_of(one) for one in tags],
         **{name: [size[i] or NAN for size in sizes] for i, (name, _) in enumerate(_SIDES)},
         "focal_px": [px for _, px in focal],
         "focal_from": [how for how, _ in focal],
