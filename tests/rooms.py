@@ -13,8 +13,6 @@ LAZY = (
     "wildlab",
     "wildlab.evaluation",
     "wildlab.flight",
-    "wildlab.flight.checks",
-    "wildlab.flight.recipe",
     "wildlab.geometry",
     "wildlab.reporting",
     "wildlab.simulation",

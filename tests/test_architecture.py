@@ -214,7 +214,7 @@ def circles(graph: dict[str, set[str]]) -> list[list[str]]:
 
 
 def folder_graph(graph: dict[str, set[str]]) -> dict[str, set[str]]:
-    """The same between the folders of a room and the files beside them: ``wildlab.flight.recipe``."""
+    """The same between the folders of a room and the files beside them: ``wildlab.flight.checks``."""
 
     def place(module: str) -> str:
         return ".".join(module.split(".")[:3])

@@ -22,7 +22,7 @@ import pytest
 from tests.analysis.survey_twin import Survey, simulate
 from tests.annotation import HOSTILE, ask, serving, write_images
 from tests.commands import call
-from wildlab.flight.readers.formats import read_log
+from wildlab.flight.readers import read_log
 from wildlab.flight.readers.frames.image import read_image
 from wildlab.flight.store import load_flight, save_flight
 from wildlab.runner.annotation.server import (

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from wildlab.api.flights import check, evaluate_points, georeference, simulate
     from wildlab.api.plot import plot
     from wildlab.api.tracks import consistency, navigate, track
-    from wildlab.flight.recipe.importing import import_flight
+    from wildlab.flight.importing import import_flight
     from wildlab.flight.store import Flight, load_flight, save_flight
 else:
     __getattr__, __dir__ = offer(

@@ -31,7 +31,7 @@ def offer(package: str, folders: Sequence[str] = ()) -> tuple[Callable[[str], An
 
     Examples
     --------
-    >>> get, names = offer("wildlab.flight.checks")
+    >>> get, names = offer("wildlab.flight")
     >>> get("Finding").__name__
     'Finding'
     """

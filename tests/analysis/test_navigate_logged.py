@@ -18,7 +18,7 @@ from wildlab.analysis.navigate import (
     navigate_mekf,
 )
 from wildlab.flight.clocks import covariances, poses_at
-from wildlab.flight.recipe.importing import import_flight
+from wildlab.flight.importing import import_flight
 from wildlab.flight.store import Flight, load_flight
 from wildlab.geometry.frames import (
     matrix_to_euler,

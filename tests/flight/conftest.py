@@ -14,8 +14,8 @@ import pandas as pd
 import pytest
 
 from wildlab.flight.files import dump_toml
+from wildlab.flight.importing import import_flight
 from wildlab.flight.manifest import make_manifest
-from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.schema import COVARIANCE_COLUMNS
 from wildlab.flight.store import Flight
 

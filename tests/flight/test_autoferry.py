@@ -11,8 +11,8 @@ import pytest
 from tests.flight.conftest import fault
 from wildlab.errors import WildlabError
 from wildlab.flight.checks.check import check_flight
+from wildlab.flight.importing import import_flight
 from wildlab.flight.readers.autoferry import SENSORS, read_part
-from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.store import Flight, load_flight
 from wildlab.paths import DATA
 

@@ -34,7 +34,6 @@ def test_rate_and_offset_through_jitter_and_outliers(jitter, outliers):
         wrong = rng.random(len(own)) < outliers
         fit = fit_clock(own, true + rng.normal(0, jitter, len(own)) + wrong * rng.normal(0, 100, len(own)))
         assert_as_promised(fit, own, true, rate)
-        assert 0.8 * jitter < fit.spread_s < 1.2 * jitter
 
 
 @pytest.mark.parametrize("kind", ["uniform", "exponential", "steps of a stamp"])

@@ -16,7 +16,7 @@ from wildlab.flight.checks.check import check_flight, usable_for
 from wildlab.flight.checks.inertial import FORCE, RATE
 from wildlab.flight.checks.inertial import samples as inertial_samples
 from wildlab.flight.clocks import gnss_times
-from wildlab.flight.recipe.importing import import_flight
+from wildlab.flight.importing import import_flight
 from wildlab.flight.store import Flight, load_flight
 from wildlab.paths import DATA
 

@@ -14,7 +14,7 @@ from wildlab.files import sha256
 from wildlab.flight.checks.check import check_flight, usable_for
 from wildlab.flight.clocks import frame_poses
 from wildlab.flight.files import dump_toml
-from wildlab.flight.recipe.importing import import_flight
+from wildlab.flight.importing import import_flight
 from wildlab.flight.store import Flight, load_flight
 from wildlab.geometry.frames import matrix_to_euler
 from wildlab.geometry.mount import camera_pose

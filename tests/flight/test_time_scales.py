@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wildlab.flight.units import gps_to_utc, week_to_utc
+from wildlab.flight.clock_fitting import gps_to_utc, week_to_utc
 
 #: TAI - UTC from each date on (IERS); GPS time is 19 s behind TAI.
 TAI_MINUS_UTC = {

@@ -203,7 +203,7 @@ def test_tables_give_names_back_and_hold_no_formula(names):
 @settings(max_examples=25, deadline=None, derandomize=True)
 @given(st.lists(NAMES, min_size=1, max_size=4))
 def test_detections_and_clicks_are_read_back_by_name(names):
-    from wildlab.flight.readers.formats import read_log
+    from wildlab.flight.readers import read_log
     from wildlab.flight.readers.labels import read_table
 
     names = [shown for name in names if (shown := "".join(filter(str.isprintable, name)).strip())] or ["a"]

@@ -14,7 +14,7 @@ import pytest
 from tests.page_words import MOST_IN_ANSWER, MOST_WORDS, words_in_sight
 from tests.studies.claims import checks_of
 from wildlab.evaluation.consistency import white_bound
-from wildlab.flight.recipe.importing import import_flight
+from wildlab.flight.importing import import_flight
 from wildlab.paths import DATA
 from wildlab.reporting.published import load_claims, load_published
 from wildlab.runner.catalogue import StudyEntry, load_studies

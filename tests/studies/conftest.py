@@ -10,7 +10,7 @@ import pytest
 
 from tests.analysis.conftest import make_flight
 from wildlab.analysis.tracks.noise_model import SensorTuning
-from wildlab.flight.recipe.importing import import_flight
+from wildlab.flight.importing import import_flight
 from wildlab.flight.store import Flight
 from wildlab.paths import DATA
 from wildlab.studies.autoferry import tune_sensor

@@ -11,7 +11,7 @@ from wildlab.analysis.diagnose import diagnose
 from wildlab.analysis.evaluate import errors_of, recorded_answers, score_points
 from wildlab.analysis.georeference import georeference, observe
 from wildlab.evaluation.errors import summarise
-from wildlab.flight.recipe.importing import import_flight
+from wildlab.flight.importing import import_flight
 from wildlab.geometry.frames import (
     euler_to_matrix,
     matrix_to_quaternion,

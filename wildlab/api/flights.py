@@ -13,7 +13,7 @@ from wildlab.analysis.evaluate import errors_of, score_points
 from wildlab.analysis.georeference import covariances_of, observe
 from wildlab.analysis.georeference import georeference as to_ground
 from wildlab.evaluation.errors import ErrorSummary, summarise
-from wildlab.flight.checks import Finding, Use, check_flight, usable_for
+from wildlab.flight.checks.check import Finding, Use, check_flight, usable_for
 from wildlab.flight.store import Flight
 from wildlab.geometry.covariances import chi2_quantile
 from wildlab.simulation.twins import simulate_twin

@@ -16,7 +16,7 @@ from wildlab.errors import WildlabError
 from wildlab.terminal import count, print_json, print_table, sentence, shown, stopped
 
 if TYPE_CHECKING:
-    from wildlab.flight.card.proposal import Proposal, Wishes
+    from wildlab.flight.card import Proposal, Wishes
     from wildlab.flight.store import Flight
 
 #: Images without a frame that are named.
@@ -92,7 +92,7 @@ def import_(
     if as_json and not dry_run and not recipe:
         raise click.UsageError("--json goes with --dry-run.")
     if recipe and out is not None:
-        from wildlab.flight.recipe.importing import import_flight
+        from wildlab.flight.importing import import_flight
 
         _report(import_flight(raw[0], source, out, overwrite, calibration, terrain), out)
         click.echo(f'Next: wildlab check "{shown(out)}"', err=True)
@@ -103,7 +103,7 @@ def import_(
         if not as_json:
             click.echo(card.recipe, nl=False)
         return
-    from wildlab.flight.card.importing import import_card, recipe_beside
+    from wildlab.flight.card import import_card, recipe_beside
 
     _report(import_card(card, out, overwrite, calibration, terrain), out)
     click.echo(f'What was decided stands in "{shown(recipe_beside(out))}"; change it, and then:', err=True)
@@ -121,7 +121,7 @@ def _report(flight: Flight, out: Path) -> None:
 
 
 def _card(raw: tuple[Path, ...], out: Path | None, wishes: dict[str, Any]) -> Proposal:
-    from wildlab.flight.card.importing import read_card
+    from wildlab.flight.card import read_card
     from wildlab.flight.files import printable
 
     roles = {}
@@ -138,9 +138,8 @@ def _card(raw: tuple[Path, ...], out: Path | None, wishes: dict[str, Any]) -> Pr
 
 def _wishes(raw: tuple[Path, ...], out: Path | None, wishes: dict[str, Any]) -> Wishes:
     from wildlab.flight.calibration_files import read_camera
-    from wildlab.flight.card.importing import safe_name
-    from wildlab.flight.card.proposal import Wishes
-    from wildlab.flight.units import find_zone
+    from wildlab.flight.card import Wishes, safe_name
+    from wildlab.flight.clock_fitting import find_zone
 
     start = None
     if wishes["start"] is not None:
@@ -166,7 +165,7 @@ def _wishes(raw: tuple[Path, ...], out: Path | None, wishes: dict[str, Any]) -> 
 
 
 def _say(card: Proposal, as_json: bool) -> None:
-    from wildlab.flight.card.importing import HEADINGS, rows_of, sentences_of
+    from wildlab.flight.card import HEADINGS, rows_of, sentences_of
 
     rows = rows_of(card.choices)
     said = [stopped(one) for one in (*sentences_of(card.choices), *card.notes)]

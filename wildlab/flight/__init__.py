@@ -25,12 +25,12 @@ if TYPE_CHECKING:
         poses_at,
         truth_at,
     )
+    from wildlab.flight.importing import import_flight
     from wildlab.flight.manifest import Manifest, make_manifest, manifest_toml, replace_in_manifest
-    from wildlab.flight.recipe.importing import import_flight
     from wildlab.flight.schema import NAV, TABLES, conform
     from wildlab.flight.store import Flight, load_flight, save_flight
 else:
-    __getattr__, __dir__ = offer(__name__, folders=("checks", "readers", "recipe", "terrain"))
+    __getattr__, __dir__ = offer(__name__, folders=("checks", "readers", "terrain"))
 
 __all__ = [
     "NAV",

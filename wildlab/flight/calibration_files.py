@@ -62,12 +62,13 @@ class ViewPart(Strict):
 
 
 class CameraFile(Strict):
-    """The whole file. ``covariance`` is that of the parameters, in their order and units."""
+    """The whole file. ``covariance`` is that of the parameters, in their order and units; one that is written
+    by hand has ``[camera]`` alone."""
 
     format: Literal[1] = 1
     camera: CameraPart
-    board: BoardPart
-    evidence: EvidencePart
+    board: BoardPart | None = None
+    evidence: EvidencePart | None = None
     covariance: tuple[tuple[float, ...], ...] = ()
     parameter: tuple[ParameterPart, ...] = ()
     view: tuple[ViewPart, ...] = ()
@@ -87,17 +88,6 @@ def read_camera(path: Path) -> CameraFile:
         Where it is missing, not TOML, or a key is unknown, missing or wrong.
     """
     return check_model(CameraFile, read_toml(path, WHAT), path)
-
-
-def parse_camera(text: str, path: Path) -> CameraFile:
-    """The same from its text; `path` is only for messages.
-
-    Raises
-    ------
-    WildlabError
-        Where it is not TOML, or a key is unknown, missing or wrong.
-    """
-    return check_model(CameraFile, parse_toml(text, path), path)
 
 
 #: Focal lengths and principal points that differ by no more than this share of the focal length are the same.

@@ -174,16 +174,8 @@ def fetch(name: str, progress: Progress | None = None) -> list[Path]:
 
 
 def _place(folder: Path, file: DataFile) -> Path:
-    """Where a file goes: nothing is written through links that leave the folder, no folder is replaced."""
-    place = inside(folder, file.path, file=folder, field=file.path)
-    for parent in (place.parent, *place.parent.parents):
-        if parent.exists():
-            if parent.is_dir():
-                break
-            raise WildlabError("is in the way of a folder", "move it away", file=parent)
-    if place.exists() and not place.is_file():
-        raise WildlabError("is in the way of a file", "move it away", file=place)
-    return place
+    """Where a file goes: nothing is written through links that leave the folder."""
+    return inside(folder, file.path, file=folder, field=file.path)
 
 
 def _is_right(path: Path, file: DataFile) -> bool:

@@ -1,9 +1,12 @@
-"""One clock against another: rate and offset from pairs of stamps, through them or, where these can only be
-late, under them; and which image belongs to which trigger, by the pattern of their times."""
+"""Scales of time and zones, and one clock against another: rate and offset from pairs of stamps, through
+them or, where these can only be late, under them; which image belongs to which trigger, by their pattern."""
 
 from __future__ import annotations
 
+import re
+import zoneinfo
 from bisect import bisect_left
+from datetime import UTC, datetime, timedelta, timezone, tzinfo
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 from wildlab.errors import WildlabError
 
 Array = NDArray[np.float64]
+#: First and last stamp, s.
+Span = tuple[float, float]
 
 #: Stamps are numbers of this resolution at best: s since 1970 in 64 bits.
 RESOLUTION_S = 1e-6
@@ -30,12 +35,8 @@ class ClockFit(NamedTuple):
         s; the middle of the pairs used, so that rate and offset hardly have to do with each other.
     rate
         Seconds of the reference for a second of the clock.
-    residual
-        (N,) s, reference minus fit, NaN where a stamp was missing.
     used
         (N,) pairs that the fit rests on; the others are outliers.
-    spread_s
-        Robust standard deviation of the residuals used.
     rate_sd
         Standard deviation of ``rate``; infinite where the pairs do not tell.
     """
@@ -43,9 +44,7 @@ class ClockFit(NamedTuple):
     own_0: float
     reference_0: float
     rate: float
-    residual: Array
     used: NDArray[np.bool_]
-    spread_s: float
     rate_sd: float = np.inf
 
     def to_reference(self, own: ArrayLike) -> Array:
@@ -108,19 +107,9 @@ def fit_clock(
     line = _under(dx, dy, at_0, rate) if late else _through(dx, dy, at_0, rate, resolution_s)
     at_0, rate, used, rate_sd = line
     middle = float(dx[used].mean())
-    residual = np.full(len(x), np.nan)
-    residual[known] = dy - at_0 - rate * dx
     every = np.zeros(len(x), bool)
     every[np.flatnonzero(known)[used]] = True
-    return ClockFit(
-        x_0 + middle,
-        y_0 + at_0 + rate * middle,
-        rate,
-        residual,
-        every,
-        _scale(residual[every]),
-        rate_sd,
-    )
+    return ClockFit(x_0 + middle, y_0 + at_0 + rate * middle, rate, every, rate_sd)
 
 
 def _start(dx: Array, dy: Array) -> tuple[float, float]:
@@ -247,16 +236,7 @@ def fit_steady(
         offset = float(apart[used].min())
     else:
         offset = float(np.median(apart[used]))
-    residual = apart - offset
-    return ClockFit(
-        middle,
-        middle + offset,
-        rate,
-        residual,
-        used,
-        max(_scale(residual[used]), RESOLUTION_S),
-        fit.rate_sd,
-    )
+    return ClockFit(middle, middle + offset, rate, used, fit.rate_sd)
 
 
 #: Stamps under the line are early, and outliers, where it rises by so many of its own standard deviations
@@ -529,3 +509,127 @@ def _pair(at: Array, t: Array, near: float) -> Index:
         i, j, head = chain[head]
         pairs.append((i, j))
     return np.array(pairs[::-1], np.intp).reshape(-1, 2)
+
+
+# -- scales of time, and zones
+
+
+#: 1980-01-06, when both were alike, in s since 1970.
+GPS_START_S = 315964800.0
+WEEK_S = 604800.0
+#: First days on which UTC was one second further behind GPS time (IERS Bulletin C); none is announced since.
+LEAP_DAYS = (
+    *("1981-07-01", "1982-07-01", "1983-07-01", "1985-07-01", "1988-01-01", "1990-01-01", "1991-01-01"),
+    *("1992-07-01", "1993-07-01", "1994-07-01", "1996-01-01", "1997-07-01", "1999-01-01", "2006-01-01"),
+    *("2009-01-01", "2012-07-01", "2015-07-01", "2017-01-01"),
+)
+#: The same in s since 1970, UTC.
+_STARTS = np.array([datetime.fromisoformat(day).replace(tzinfo=UTC).timestamp() for day in LEAP_DAYS])
+
+
+def gps_to_utc(gps_s: ArrayLike) -> Array:
+    """UTC in s since 1970 of GPS time (...) in s since 6 January 1980.
+
+    Parameters
+    ----------
+    gps_s
+        (...) s: weeks times 604800, and the time of week.
+
+    Returns
+    -------
+    (...) s since 1970
+
+    Examples
+    --------
+    >>> from datetime import UTC, datetime
+    >>> datetime.fromtimestamp(float(gps_to_utc(1867 * 604800 + 16)), UTC).isoformat()
+    '2015-10-17T23:59:59+00:00'
+    """
+    counted = np.asarray(gps_s, float) + GPS_START_S
+    # A leap second begins where GPS time, too, is ahead by it.
+    behind = np.searchsorted(_STARTS + np.arange(1, len(_STARTS) + 1), counted, side="right")
+    return np.where(np.isnan(counted), np.nan, counted - behind)
+
+
+def week_to_utc(week: ArrayLike, time_of_week_s: ArrayLike) -> Array:
+    """UTC in s since 1970 of a GPS week (...) and the s since it began (...)."""
+    return gps_to_utc(np.asarray(week, float) * WEEK_S + np.asarray(time_of_week_s, float))
+
+
+def find_zone(text: str, field: str = "zone") -> tzinfo:
+    """A time zone by its IANA name, or as a fixed offset such as ``+02:00``.
+
+    Parameters
+    ----------
+    text
+        As a person gives it.
+    field
+        Who asks, for messages.
+
+    Returns
+    -------
+    tzinfo
+
+    Raises
+    ------
+    WildlabError
+        Where it is neither.
+
+    Examples
+    --------
+    >>> find_zone("-03:30").utcoffset(None)
+    datetime.timedelta(days=-1, seconds=73800)
+    """
+    fixed = re.fullmatch(r"([+-])(0[0-9]|1[0-4]):([0-5][0-9])", text)
+    if fixed:
+        size = timedelta(hours=int(fixed[2]), minutes=int(fixed[3]))
+        return timezone(-size if fixed[1] == "-" else size)
+    try:
+        return zoneinfo.ZoneInfo(text)
+    except (zoneinfo.ZoneInfoNotFoundError, ValueError, OSError):
+        raise WildlabError(
+            f"{text[:60]!r} is not a time zone",
+            "write UTC, Europe/Oslo, or +02:00",
+            field=field,
+        ) from None
+
+
+def wall_to_utc(wall_s: ArrayLike, zone: str) -> NDArray[np.float64]:
+    """UTC of wall clocks, s since 1970.
+
+    Parameters
+    ----------
+    wall_s
+        (...) what the clock showed, in s since 1970 as if it were UTC; NaN stays NaN. Of an hour that a zone
+        has twice, the first is taken.
+    zone
+        As of `find_zone`.
+
+    Returns
+    -------
+    (...)
+
+    Raises
+    ------
+    WildlabError
+        Where the zone is none.
+
+    Examples
+    --------
+    >>> float(wall_to_utc(1718191800.0, "Europe/Oslo"))
+    1718184600.0
+    """
+    found = find_zone(zone)
+    wall = np.asarray(wall_s, float)
+
+    def shift(one: float) -> float:
+        if not np.isfinite(one):
+            return np.nan
+        try:
+            there = datetime.fromtimestamp(one, UTC).replace(tzinfo=found)
+            return (there.utcoffset() or timedelta()).total_seconds()
+        except (ValueError, OverflowError, OSError):
+            return np.nan
+
+    ahead = np.array([shift(float(one)) for one in wall.ravel()]).reshape(wall.shape)
+    return np.asarray(wall - ahead)

@@ -137,12 +137,10 @@ def poses_at(
             "give times",
             field="nav",
         )
-    before, after, share = _neighbours(nav["time_s"].to_numpy(float), times, "nav", max_gap_s)
-    p = _between(position, before, after, share)
-    turn = between_attitudes(attitude, before, after, share)
-    if covariance is None:
-        return p, turn, None
-    return p, turn, _between(covariance.reshape(-1, 36), before, after, share).reshape(-1, 6, 6)
+    stamps = nav["time_s"].to_numpy(float)
+    rows = _rows_about(stamps, times, _longest(stamps, "nav", max_gap_s))
+    P = None if covariance is None else _between(covariance.reshape(-1, 36), *rows).reshape(-1, 6, 6)
+    return _between(position, *rows), between_attitudes(attitude, *rows), P
 
 
 def pose_finder(
@@ -291,8 +289,7 @@ def gimbal_angles(flight: Flight) -> tuple[Array, Array]:
         return np.full(len(frames), mount.pan), np.full(len(frames), mount.tilt)
     angles = np.unwrap(flight.gimbal[["pan_rad", "tilt_rad"]].to_numpy(float), axis=0)
     stamps = flight.gimbal["time_s"].to_numpy(float)
-    neighbours = _neighbours(stamps, frame_times(flight), "gimbal")
-    pan, tilt = _between(angles, *neighbours).T
+    pan, tilt = between(stamps, angles, frame_times(flight), "gimbal").T
     return pan, tilt
 
 
@@ -328,7 +325,7 @@ def truth_at(truth: pd.DataFrame, times: ArrayLike, offset_s: float = 0.0) -> tu
         if np.isnan(stamps[mine]).all():
             where[k] = position[mine][0]
         else:
-            where[k] = _between(position[mine], *_neighbours(stamps[mine], at, f"truth of {name!r}"))
+            where[k] = between(stamps[mine], position[mine], at, f"truth of {name!r}")
     return [str(name) for name in names], where
 
 
@@ -348,14 +345,8 @@ def between(stamps: ArrayLike, values: ArrayLike, times: ArrayLike, what: str) -
     WildlabError
         Where the stamps do not increase, or there are none.
     """
-    return _between(np.asarray(values, float), *_neighbours(np.asarray(stamps, float), times, what))
-
-
-def _neighbours(
-    stamps: Array, times: ArrayLike, what: str, max_gap_s: float | None = None
-) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
-    """Rows before and after each time, and how far between them (0..1); NaN where there is no answer."""
-    return _rows_about(stamps, times, _longest(stamps, what, max_gap_s))
+    known = np.asarray(stamps, float)
+    return _between(np.asarray(values, float), *_rows_about(known, times, _longest(known, what)))
 
 
 def _longest(stamps: Array, what: str, max_gap_s: float | None = None) -> float:
@@ -375,7 +366,7 @@ def _longest(stamps: Array, what: str, max_gap_s: float | None = None) -> float:
 def _rows_about(
     stamps: Array, times: ArrayLike, longest: float
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
-    """As `_neighbours`, of stamps that were looked at."""
+    """Rows before and after each time, and how far between them (0..1); NaN where there is no answer."""
     at = np.atleast_1d(np.asarray(times, float))
     after = np.clip(np.searchsorted(stamps, at, side="left"), 0, len(stamps) - 1)
     exact = stamps[after] == at

@@ -6,6 +6,7 @@ thing pydantic finds into the one sentence a user reads.
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import errno
 import json
@@ -15,6 +16,7 @@ import re
 import stat
 import tomllib
 import typing
+import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import date, datetime, time
 from pathlib import Path, PurePosixPath, PureWindowsPath
@@ -154,8 +156,9 @@ def did_you_mean(wrong: str, known: Iterable[str]) -> str:
     return f"did you mean {close[0]!r}? Known are {every}" if close else f"use one of {every}"
 
 
-def read_toml(path: Path, what: str) -> dict[str, Any]:
-    """Read a TOML file; `what` is what it is to the user ("the manifest of a flight").
+def read_toml(path: Path, what: str, fix: str = "check the path") -> dict[str, Any]:
+    """Read a TOML file; `what` is what it is to the user ("the manifest of a flight"), `fix` what to do
+    where it is missing.
 
     Raises
     ------
@@ -165,7 +168,7 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
     try:
         content = read_regular(path, TOML_LIMIT)
     except FileNotFoundError:
-        raise WildlabError(f"there is no such file, and it is {what}", "check the path", file=path) from None
+        raise WildlabError(f"there is no such file, and it is {what}", fix, file=path) from None
     try:
         text = content.decode("utf-8")
     except UnicodeDecodeError as error:
@@ -263,6 +266,17 @@ def read_regular(path: Path, limit: int, field: str | None = None) -> bytes:
 def unreadable(error: OSError, path: Path, field: str | None = None) -> WildlabError:
     """What the system said of a file, as a sentence with what to do."""
     return system_error(error, path, field, cannot="be read")
+
+
+@contextlib.contextmanager
+def gdal() -> Iterator[None]:
+    """GDAL with a small cache, without a look at neighbouring files or the network, or a word on places."""
+    import rasterio
+    from rasterio.errors import NotGeoreferencedWarning
+
+    with warnings.catch_warnings(), rasterio.Env(GDAL_CACHEMAX=64, GDAL_DISABLE_READDIR_ON_OPEN="EMPTY_DIR"):
+        warnings.simplefilter("ignore", NotGeoreferencedWarning)
+        yield
 
 
 def check_model(model: type[Model], data: Any, path: Path | None) -> Model:

@@ -697,18 +697,8 @@ def read_manifest(path: Path) -> Manifest:
     WildlabError
         Where it is missing, not TOML, or a key is unknown, missing or wrong.
     """
-    return make_manifest(read_toml(path, "the manifest of a flight"), path)
-
-
-def parse_manifest(text: str, path: Path) -> Manifest:
-    """The manifest in the text of a `flight.toml`; `path` is only for messages.
-
-    Raises
-    ------
-    WildlabError
-        Where it is not TOML, or a key is unknown, missing or wrong.
-    """
-    return make_manifest(parse_toml(text, path), path)
+    fix = "name the folder of a flight, or make one of logs and images: wildlab import"
+    return make_manifest(read_toml(path, "the manifest of a flight", fix), path)
 
 
 def manifest_toml(manifest: Manifest) -> str:

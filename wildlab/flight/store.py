@@ -16,7 +16,6 @@ import re
 import shutil
 import tempfile
 import tomllib
-import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import product
@@ -36,8 +35,10 @@ from wildlab.flight.files import (
     TOML_LIMIT,
     dump_toml,
     flight_name,
+    gdal,
     inside,
     is_safe_name,
+    parse_toml,
     printable,
     read_regular,
     regular_size,
@@ -47,8 +48,8 @@ from wildlab.flight.manifest import (
     LocationsPart,
     Manifest,
     Sensitivity,
+    make_manifest,
     manifest_toml,
-    parse_manifest,
     read_manifest,
 )
 from wildlab.flight.schema import NAV, TABLES, Table, conform
@@ -65,6 +66,7 @@ PART = "checksums"
 STATED = "locations"
 _HEADERS = {part: re.compile(rf"^[ \t]*\[[ \t]*{part}[ \t]*\].*$", re.MULTILINE) for part in (PART, STATED)}
 _NEXT = re.compile(r"^[ \t]*\[", re.MULTILINE)
+MISSING, RESTORE = "this file is missing", "restore it, or import again"
 
 
 def table_files(folder: Path) -> dict[str, Path]:
@@ -117,24 +119,14 @@ def verify(folder: Path, stated: Mapping[str, str]) -> None:
     meant = f'if it is meant: wildlab check --accept "{folder}"'
     found = checksums_of(folder)
     for name in sorted({*stated, *found} - {FILE_NAME, STATED}):
+        if found.get(name) == stated.get(name):
+            continue
+        problem, remedy = "its SHA-256 is not that in flight.toml: it was damaged or changed", RESTORE
         if name not in found:
-            raise WildlabError(
-                "this file is missing",
-                f"restore it, or import again; {meant}",
-                file=folder / name,
-            )
-        if name not in stated:
-            raise WildlabError(
-                "it has no checksum in flight.toml: it was added later",
-                f"move it elsewhere; {meant}",
-                file=folder / name,
-            )
-        if found[name] != stated[name]:
-            raise WildlabError(
-                "its SHA-256 is not that in flight.toml: it was damaged or changed",
-                f"restore it, or import again; {meant}",
-                file=folder / name,
-            )
+            problem = MISSING
+        elif name not in stated:
+            problem, remedy = "it has no checksum in flight.toml: it was added later", "move it elsewhere"
+        raise WildlabError(problem, f"{remedy}; {meant}", file=folder / name)
 
 
 def accept_changes(folder: Path) -> list[str]:
@@ -164,7 +156,9 @@ def accept_changes(folder: Path) -> list[str]:
         new = with_checksums(text, tables)
         # What looks like the part may stand inside of a text of several lines.
         plain: dict[str, dict[str, str]] = {"checksums": {}}
-        if read_manifest(path).model_copy(update=plain) != parse_manifest(new, path).model_copy(update=plain):
+        if read_manifest(path).model_copy(update=plain) != make_manifest(parse_toml(new, path)).model_copy(
+            update=plain
+        ):
             raise WildlabError(
                 "a text in it has a line that reads [checksums]", "reword that line", file=path, field=PART
             )
@@ -464,8 +458,7 @@ def _present(path: Path) -> None:
     try:
         regular_size(path)
     except FileNotFoundError:
-        fix = "restore it, or import again"
-        raise WildlabError("this file is missing", fix, file=path) from None
+        raise WildlabError(MISSING, RESTORE, file=path) from None
 
 
 def _read(folder: Path, name: str, table: Table) -> pd.DataFrame:
@@ -636,7 +629,7 @@ def write_terrain(terrain: Terrain, path: Path) -> None:
     far_north = terrain.north + (rows - 1) * terrain.step
     half = terrain.step / 2
     transform = Affine(terrain.step, 0.0, terrain.east - half, 0.0, -terrain.step, far_north + half)
-    with _gdal(), rasterio.open(
+    with gdal(), rasterio.open(
         path, "w", driver="GTiff", width=columns, height=rows, count=1, dtype="float32", nodata=math.nan,
         transform=transform, compress="deflate", predictor=3, tiled=True, blockxsize=256, blockysize=256,
     ) as data:  # fmt: skip
@@ -671,7 +664,7 @@ def read_terrain(path: Path) -> Terrain:
     import rasterio
 
     regular_size(path)
-    with _gdal():
+    with gdal():
         try:
             with rasterio.open(path, driver="GTiff") as data:
                 terrain = _terrain(data, path)
@@ -697,13 +690,3 @@ def _terrain(data: Any, path: Path) -> Terrain:
     except (KeyError, ValueError):
         raise WildlabError("does not say where its first node is", _FIX, file=path) from None
     return Terrain(np.ascontiguousarray(data.read(1)[::-1]), north, east, float(t.a), sd)
-
-
-@contextlib.contextmanager
-def _gdal() -> Iterator[None]:
-    import rasterio
-    from rasterio.errors import NotGeoreferencedWarning
-
-    with warnings.catch_warnings(), rasterio.Env(GDAL_CACHEMAX=64, GDAL_DISABLE_READDIR_ON_OPEN="EMPTY_DIR"):
-        warnings.simplefilter("ignore", NotGeoreferencedWarning)
-        yield

@@ -78,7 +78,7 @@ def dataset_flight(dataset: str | None, recipe: str, reports: Path) -> Path:
     WildlabError
         If the data set is not fetched, or the import fails.
     """
-    from wildlab.flight.recipe.importing import import_flight
+    from wildlab.flight.importing import import_flight
 
     recipe_path = DATA / "recipes" / recipe
     source = dataset_source(dataset) if dataset else None

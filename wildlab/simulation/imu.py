@@ -145,7 +145,7 @@ def triad_data_sheet(imu: Imu, triad: str) -> TriadDataSheet:
 def read_imu(
     force: ArrayLike, angular_rate: ArrayLike, imu: Imu, stream: Callable[[str], np.random.Generator]
 ) -> tuple[Array, Array]:
-    """Readings of a unit with that data sheet, calibrated to the body: (N, 3) m/s^2 and (N, 3) rad/s.
+    """Stream of a unit with that data sheet, calibrated to the body: (N, 3) m/s^2 and (N, 3) rad/s.
 
     ``stream`` gives the random numbers of each triad by its name.
     """

@@ -278,7 +278,7 @@ def gauss_markov(draws: Array, sd: Array, kept: Array) -> None:
 def read_triad(
     true: Array, axes: Array, turn_on: Array, drift: Array, noise: Array, density: float, limits: Array
 ) -> None:
-    """Readings of three axes in the place of their ``noise``: (N, 3) standard normal draws.
+    """Stream of three axes in the place of their ``noise``: (N, 3) standard normal draws.
 
     ``axes`` (3, 3), ``turn_on`` (3,) and ``drift`` (N, 3) are the triad's misalignment and its biases;
     ``limits`` (2,) are range and resolution, of which 0 is none.

@@ -165,7 +165,7 @@ def payload_boresight(twin: TwinParameters, seed: int) -> AttitudeDisturbance:
 
 
 def imu_table(twin: TwinParameters, payload: Trajectory, seed: int) -> pd.DataFrame:
-    """Readings of the inertial unit over the whole flight, calibrated: turned from its axes to those of b.
+    """Stream of the inertial unit over the whole flight, calibrated: turned from its axes to those of b.
 
     It feels the motion in its own axes, as it is mounted, and errs in these. `as_mounted` gives its readings
     as they were before the calibration.

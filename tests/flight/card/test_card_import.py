@@ -9,14 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from PIL import Image
 
 from tests.flight.card.cards import MARKS, TAKEN, gpx, write_card, write_photo
+from tests.flight.readers.dataflash_logs import Truth, third_generation
 from wildlab.api.flights import georeference
 from wildlab.cli import wildlab
 from wildlab.errors import WildlabError
-from wildlab.flight.card.importing import import_card, read_card, recipe_beside
-from wildlab.flight.card.proposal import Proposal, Wishes
-from wildlab.flight.recipe.importing import import_flight
+from wildlab.flight.card import Proposal, Wishes, import_card, read_card, recipe_beside
+from wildlab.flight.importing import import_flight
+from wildlab.flight.readers import read_log
 from wildlab.flight.store import load_flight
 
 
@@ -139,6 +141,38 @@ def test_an_empty_card_and_one_that_says_nothing(tmp_path):
             read(tmp_path / "card", zone="")
     with pytest.raises(WildlabError, match="is not there"):
         read(tmp_path / "lost")
+
+
+def untimed(folder: Path, more: int) -> Path:
+    """An autopilot's log, and images without a tag: as many as records of triggers and so many more."""
+    data = third_generation(Truth(2025), 40.0).binary()
+    count = len(read_log(Path("x.bin"), data, "dataflash").parts["triggers"])
+    folder.mkdir()
+    (folder / "flight.bin").write_bytes(data)
+    for number in range(count + more):
+        Image.new("L", (64, 48), number).save(folder / f"img_{number + 1}.png")
+    return folder
+
+
+def test_images_without_any_time_have_those_of_as_many_triggers(tmp_path):
+    flight = import_card(read(untimed(tmp_path / "card", 0), focal_px=80.0), tmp_path / "flight")
+    times = flight.table("frames")["time_s"].to_numpy()
+    assert flight.table("frames")["frame_id"].tolist() == [f"img_{i + 1}" for i in range(len(times))]
+    assert len(times) > 3 and (np.diff(times) > 0).all() and flight.manifest.time.kind == "utc"
+
+
+def test_others_are_left_out_with_what_to_do(tmp_path):
+    card = read(untimed(tmp_path / "card", 1), focal_px=80.0)
+    assert any("as many images as there are records" in one for one in card.notes)
+    assert import_card(card, tmp_path / "flight").frames is None
+
+
+def test_plain_tables_are_told_that_they_take_a_recipe(tmp_path):
+    (tmp_path / "log.csv").write_text("t,roll,pitch\n0,1,2\n1,1,2\n")
+    with pytest.raises(WildlabError, match="a recipe says what its columns are"):
+        read(tmp_path)
+    called = CliRunner().invoke(wildlab, ["check", str(tmp_path)])
+    assert called.exit_code and "wildlab import" in str(called.exception)
 
 
 def test_several_folders_of_images_are_one_series(card, tmp_path):

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from wildlab.flight.card.images import clock_of_images
-from wildlab.flight.card.roles import CardItem
+from wildlab.flight.card_items import CardItem, clock_of_images
+from wildlab.flight.raw_files import stamped_by
 from wildlab.flight.readers.log import RawLog, Stream, make_stream
-from wildlab.flight.recipe.raw import stamped_by
 
 START = 1.7e9
 #: When images were truly taken: not evenly, as on the way from row to row.
@@ -21,7 +20,7 @@ def images(wall: NDArray[np.float64] | None, utc: NDArray[np.float64] | None = N
     columns: dict[str, object] = {"file": [f"a{i}.jpg" for i in range(count)]}
     columns["time_log_s"] = np.full(count, np.nan) if wall is None else wall
     columns["time_s"] = np.full(count, np.nan) if utc is None else utc
-    return CardItem("DCIM", "photos", RawLog("photos", {"photos": make_stream("photos", columns)}))
+    return CardItem("DCIM", "photos", RawLog({"photos": make_stream("photos", columns)}))
 
 
 def triggers(times: NDArray[np.float64]) -> Stream:
@@ -31,7 +30,7 @@ def triggers(times: NDArray[np.float64]) -> Stream:
 def own(first: float = START - 60, last: float = START + 400) -> CardItem:
     t = np.arange(first, last)
     columns = {"time_s": t, "latitude_deg": 0 * t + 59, "longitude_deg": 0 * t + 10, "height_sea_m": 0 * t}
-    return CardItem("flight.bin", "dataflash", RawLog("dataflash", {"gnss": make_stream("gnss", columns)}))
+    return CardItem("flight.bin", "dataflash", RawLog({"gnss": make_stream("gnss", columns)}))
 
 
 def photos_of(found: CardItem) -> Stream:

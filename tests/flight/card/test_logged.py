@@ -7,11 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wildlab.flight.card.importing import import_card, read_card
-from wildlab.flight.card.proposal import Wishes
+from wildlab.flight.card import Wishes, import_card, read_card
+from wildlab.flight.raw_files import log_part
 from wildlab.flight.readers.log import RawLog, make_stream
-from wildlab.flight.recipe.model import LogTable
-from wildlab.flight.recipe.raw import log_part
+from wildlab.flight.recipes import LogTable
 from wildlab.flight.store import Flight
 
 Shared = Callable[..., Path]
@@ -73,5 +72,5 @@ def test_subtitles_come_in(shared_data, tmp_path, name):
 def test_stamps_of_a_log_without_utc_count_from_what_is_stated():
     stream = make_stream("gnss", {"time_s": [np.nan, np.nan], "time_log_s": [0.5, 2.0]})
     wanted = LogTable(file="a.srt", format="dji-srt", part="gnss", offset_s=1000.0)
-    found = log_part(RawLog("dji-srt", {"gnss": stream}), wanted, Path("a.srt"))
+    found = log_part(RawLog({"gnss": stream}), wanted, Path("a.srt"))
     assert found.columns["time_s"].tolist() == [1000.5, 1002.0]

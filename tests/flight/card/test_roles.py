@@ -7,7 +7,7 @@ import pymap3d
 import pytest
 
 from wildlab.errors import WildlabError
-from wildlab.flight.card.roles import CardItem, choose_roles
+from wildlab.flight.card_items import CardItem, choose_roles
 from wildlab.flight.readers.log import RawLog, make_stream
 
 START = 1.7e9
@@ -41,7 +41,7 @@ def log(
 
 def holding(name: str, vehicle: str = "", **parts: dict[str, Any]) -> CardItem:
     streams = {part: make_stream(part, columns) for part, columns in parts.items()}
-    return CardItem(name, "gpx", RawLog("gpx", streams, vehicle=vehicle))
+    return CardItem(name, "gpx", RawLog(streams, vehicle=vehicle))
 
 
 DRONE = log("drone", attitude=True)

@@ -140,4 +140,4 @@ def test_nothing_is_said_where_no_mistake_explains_it(flight):
 def test_the_mean_cosine_is_that_of_a_known_angle():
     given = headed(_Flight(COURSE + 0.3).nav["log"])
     # The course over two seconds is that of their middle, but for the half step the positions lie late.
-    np.testing.assert_allclose(follows(*given[:2]), np.cos(0.3), atol=0.02)
+    np.testing.assert_allclose(follows(given[0], np.angle(given[1])), np.cos(0.3), atol=0.02)

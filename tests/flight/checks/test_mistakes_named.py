@@ -388,6 +388,13 @@ CASES: dict[str, list[tuple[Any, ...]]] = {
             *("felt-unexplained", f"warning {NAV}"),
         ),
         (euler(NAV, lambda e: e + np.array([0, 0, 12])), "heading-off", f"warning {NAV}", "heading off"),
+        (
+            both(
+                euler(NAV, lambda e: e - np.array([0, 0, 12])),
+                state({"magnetometer": {"declination_deg": 12.0}}),
+            ),
+            *("heading-off", f"warning {NAV}", "declination missing"),
+        ),
         (scale(MAGNETOMETER, 0.01, "magnetometer"), "field-unit", FIELD),
         (scale(MAGNETOMETER, 0.001, "magnetometer"), "field-in-ut", FIELD),
         (scale(MAGNETOMETER, 4e-6, "magnetometer"), "field-size", FIELD),
@@ -408,9 +415,24 @@ CASES: dict[str, list[tuple[Any, ...]]] = {
     ],
     "poses alone": [
         (euler(NAV, lambda e: e * [1, 1, -1]), "heading-not-course", f"warning {NAV}", "sign of yaw"),
+        (
+            euler(NAV, lambda e: e[:, [1, 0, 2]]),
+            *("lean-not-course", f"warning {NAV}", "attitude: roll and pitch exchanged"),
+        ),
+        (euler(NAV, lambda e: e * [-1, 1, 1]), "lean-not-course", f"warning {NAV}", "attitude: sign of roll"),
+        (
+            euler(NAV, lambda e: e * [1, 1, DEGREES] + [0, 0, 5]),
+            *("turns-too-fast", f"problem {NAV} q_w", "attitude in degrees"),
+        ),
+        (
+            euler(NAV, lambda e: np.radians(np.unwrap(e, axis=0, period=360))),
+            *("heading-not-course", f"warning {NAV}", "yaw in radians, read as degrees"),
+        ),
     ],
     # Motion and place.
     "track": [
+        # Across the way, where no clock would be blamed.
+        (both(leap("gnss", 40.0, 0.0), leap(NAV, 40.0, 0.0)), "leap", f"problem {NAV} north_m"),
         (scale(VELOCITY, [-1, 1, 1], "gnss"), *SPEEDS, "sign of north"),
         (scale(VELOCITY, 1 / 0.514444, "gnss"), *SPEEDS, "velocity in kn"),
         (put(NAV, NED[0], ALL, 0.0), "motion-unexplained", f"warning {NAV} v_north_m_s"),
@@ -434,6 +456,7 @@ CASES: dict[str, list[tuple[Any, ...]]] = {
     ],
     "straight, without velocities": [
         (leap("gnss", 60.0, 0.5), *LEAPT),
+        (leap("gnss", 60.0, 1.0), *LEAPT),
     ],
     "without velocities": [
         (moved([0, 0, -40.0], "gnss"), *PLACES, "constant height"),

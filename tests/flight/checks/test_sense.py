@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.analysis.survey_twin import Survey, simulate
-from wildlab.flight.checks import findings, motion, tables
+from wildlab.flight.checks import check, findings, motion
 from wildlab.flight.checks.attitude import Felt, FieldStep, felt_mistakes, field_mistakes
 from wildlab.flight.checks.findings import attitude_mistakes, axes_words, other_axes, place_mistakes
 from wildlab.flight.checks.known_points import sightings
@@ -101,12 +101,12 @@ def test_an_origin_far_away(make_flight, north, level):
 
 def test_whole_hours_between_stamps_are_a_zone(make_flight):
     flight = make_flight()
-    assert list(tables.stamps(flight)) == []
+    assert list(check.stamps(flight)) == []
     flight.tables["frames"]["time_s"] += 7200.0
-    (found,) = tables.stamps(flight)
+    (found,) = check.stamps(flight)
     assert found.table == "frames" and "2 h late" in found.sentence
     flight.tables["frames"]["time_s"] += 400.0  # no whole quarter of an hour
-    assert list(tables.stamps(flight)) == []
+    assert list(check.stamps(flight)) == []
 
 
 def test_positions_that_stand_still_are_no_unit_of_speed():

@@ -12,10 +12,9 @@ from tests.flight.checks.watching import level_poses, watch
 from tests.flight.conftest import table
 from wildlab.analysis.tracks.scans import scans_of
 from wildlab.errors import WildlabError
-from wildlab.flight.checks.check import check_flight
+from wildlab.flight.checks.check import check_flight, duplicates
 from wildlab.flight.checks.findings import Finding
 from wildlab.flight.checks.sensors import sensors
-from wildlab.flight.checks.tables import duplicates
 from wildlab.flight.clocks import poses_at
 from wildlab.flight.manifest import make_manifest, replace_in_manifest
 from wildlab.flight.store import Flight

@@ -9,8 +9,8 @@ import pytest
 from tests.flight.readers import made_up_photos as made
 from tests.flight.readers.tracks import near
 from wildlab.errors import WildlabError
+from wildlab.flight.readers import read_folder, read_log
 from wildlab.flight.readers.clicks import clicks_sniff
-from wildlab.flight.readers.formats import read_folder, read_log
 from wildlab.flight.readers.log import RawLog
 
 HERE = Path("clicks")

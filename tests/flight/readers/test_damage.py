@@ -19,6 +19,7 @@ from tests.flight.readers.test_ubx import message, pvt
 from tests.flight.readers.test_ulog import flight
 from tests.flight.readers.tracks import Reader, check, survives
 from wildlab.errors import WildlabError
+from wildlab.flight.readers.log import CUT_OFF
 
 gpx, nmea, ubx, airdata = (Reader(one) for one in ("gpx", "nmea", "ubx", "airdata"))
 mrk, srt, rtklib_pos = (Reader(one) for one in ("dji-mrk", "dji-srt", "rtklib-pos"))
@@ -84,6 +85,20 @@ def test_damage(reader, data, share):
     assert survives(reader.read, data) > share
     if reader is srt:
         assert survives(lambda path, data, zone: srt.read(path, data, "UTC"), data) > share
+
+
+@pytest.mark.parametrize(
+    ("reader", "data"),
+    [(px4, ulog(flight(), {"sys_name": "PX4"})), (dataflash, third_generation(Truth(2025), 8.0).binary())],
+)
+def test_a_log_that_was_cut_off_is_called_so(reader, data):
+    def cut_off(read: bytes) -> bool:
+        return CUT_OFF in reader.read(Path("x"), read).notes
+
+    assert not cut_off(data)
+    # Here and there a cut falls between two messages.
+    cuts = [len(data) // 2 + by for by in range(20)]
+    assert sum(cut_off(data[:at]) for at in cuts) >= len(cuts) - 2
 
 
 @pytest.mark.parametrize(

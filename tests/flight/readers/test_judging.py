@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wildlab.flight.readers.log import Readings, drop_rare_heights, judge
+from wildlab.flight.readers.log import Stream, drop_rare_heights, judge
 from wildlab.flight.readers.text import decode, number, numbers
 
 WORDS = ["", " 1.5", "-2", "+.5", "1e3", "1_0", "nan", "inf", "1e999", "0x10", "1,5", "٣", "=1+1", "1" * 100]
@@ -42,7 +42,7 @@ ROW = st.tuples(
 def test_rows_of_use_hold_together(rows):
     time, latitude, longitude, height = np.array(rows, float).T
     columns = {"time_s": time, "latitude_deg": latitude, "longitude_deg": longitude, "height_sea_m": height}
-    use = ~np.logical_or.reduce(list(judge("gnss", Readings(columns)).values()))
+    use = ~np.logical_or.reduce(list(judge("gnss", Stream(columns)).values()))
     assert np.isfinite(np.column_stack([latitude, longitude])[use]).all()
     assert np.isfinite(height[use]).all() or np.isnan(height[use]).all()
     if np.isfinite(time).any():
@@ -66,7 +66,7 @@ def test_one_wrong_row_costs_one_row():
                 "longitude_deg": np.full(count, 10.0),
             }
             columns[name][row] = value
-            use = ~np.logical_or.reduce(list(judge("gnss", Readings(columns)).values()))
+            use = ~np.logical_or.reduce(list(judge("gnss", Stream(columns)).values()))
             assert np.flatnonzero(~use).tolist() == [row]
 
 
@@ -74,7 +74,7 @@ def test_two_tracks_of_which_one_cannot_be():
     time = 1.6e9 + np.arange(40.0)
     latitude = np.where((np.arange(40) >= 10) & (np.arange(40) < 14), -20.0, 60.0)
     found = judge(
-        "gnss", Readings({"time_s": time, "latitude_deg": latitude, "longitude_deg": np.full(40, 10.0)})
+        "gnss", Stream({"time_s": time, "latitude_deg": latitude, "longitude_deg": np.full(40, 10.0)})
     )
     assert np.flatnonzero(found["impossible jump"]).tolist() == [10, 11, 12, 13]
 
@@ -85,7 +85,7 @@ def test_degrees_of_longitude_are_short_up_north():
     for speed, flown in ((650.0, True), (800.0, False)):
         longitude = np.degrees(speed * np.arange(30) / (6371e3 * np.cos(np.radians(80))))
         found = judge(
-            "gnss", Readings({"time_s": time, "latitude_deg": np.full(30, 80.0), "longitude_deg": longitude})
+            "gnss", Stream({"time_s": time, "latitude_deg": np.full(30, 80.0), "longitude_deg": longitude})
         )
         assert found["impossible jump"].any() != flown
 

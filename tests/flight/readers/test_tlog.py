@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega
 
 from tests.flight.readers.mavlink_logs import BOOT_S, START_S, frame, joined, made, telemetry
 from tests.flight.readers.tracks import Reader, check, near
-from wildlab.flight.readers.formats import recognise
+from wildlab.flight.readers import recognise
 from wildlab.flight.readers.tlog import walk
 
 tlog = Reader("tlog")
@@ -42,7 +42,7 @@ def test_sample(shared_data):
     log = read(data)
     sizes = {"poses": 604, "gnss": 732, "imu": 771, "magnetometer": 771}
     assert {name: len(part) for name, part in log.parts.items()} == sizes
-    assert (log.lost, log.clock.base) == ((), "times of receipt")
+    assert (log.lost, log.clock) == ((), "times of receipt")
     # Receipts are never early, and were up to 0.9 s late.
     receipts = {m.time_boot_ms: at for at, m in decoded(data) if m.get_type() == "ATTITUDE"}
     poses = log.parts["poses"].columns
@@ -58,7 +58,7 @@ def test_vehicles_own_utc_is_taken_where_it_is_near_the_receipts():
         text = made("SYSTEM_TIME", time_boot_ms=boot, time_unix_usec=unix)
         told.append((START_S + row + 0.2, frame(text, START_S + row + 0.2)))
     log = read(joined(telemetry(), told))
-    assert log.clock.base == "UTC of the messages SYSTEM_TIME"
+    assert log.clock == "UTC of the messages SYSTEM_TIME"
     poses = log.parts["poses"].columns
     near(poses, 1e-3, time_s=START_S + 3 + poses["time_log_s"] - BOOT_S)
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from wildlab.errors import WildlabError
-from wildlab.flight.readers.formats import FORMATS, read_log
+from wildlab.flight.readers import FORMATS, read_log
 from wildlab.flight.readers.log import PARTS, TIMES, RawLog
 
 Read = Callable[[Path, bytes, str | None], RawLog]

@@ -12,9 +12,9 @@ import scipy.io
 
 from wildlab.errors import WildlabError
 from wildlab.files import sha256
-from wildlab.flight.recipe import raw
-from wildlab.flight.recipe.model import MatlabTable
-from wildlab.flight.recipe.raw import read_matlab, table_of
+from wildlab.flight import raw_files as raw
+from wildlab.flight.raw_files import read_matlab, table_of
+from wildlab.flight.recipes import MatlabTable
 
 HERE = Path("log.mat")
 

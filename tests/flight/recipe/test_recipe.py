@@ -18,10 +18,10 @@ from tests.flight.recipe.comparing import near
 from wildlab.errors import WildlabError
 from wildlab.flight.checks.check import check_flight
 from wildlab.flight.clocks import covariances
-from wildlab.flight.recipe.model import Attitude
-from wildlab.flight.recipe.tables import _rotation
+from wildlab.flight.recipe_tables import _rotation
+from wildlab.flight.recipes import Attitude
+from wildlab.flight.schema import UNITS, factor
 from wildlab.flight.store import Flight, accept_changes, load_flight
-from wildlab.flight.units import UNITS, factor
 from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
 from wildlab.runner.track import track_many
 

@@ -7,7 +7,7 @@ import pytest
 
 from tests.flight.conftest import fault
 from wildlab.errors import WildlabError
-from wildlab.flight.recipe.importing import import_flight
+from wildlab.flight.importing import import_flight
 
 Change = Callable[[Any], None]
 

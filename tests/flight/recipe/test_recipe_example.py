@@ -13,11 +13,11 @@ from wildlab.files import sha256
 from wildlab.flight.calibration_files import CameraFile, read_camera, write_calibration
 from wildlab.flight.checks.check import check_flight, usable_for
 from wildlab.flight.clocks import frame_poses, frame_times, truth_at
-from wildlab.flight.files import check_model
-from wildlab.flight.recipe.importing import import_flight
-from wildlab.flight.recipe.model import Recipe
+from wildlab.flight.files import check_model, dump_toml
+from wildlab.flight.importing import import_flight
+from wildlab.flight.recipes import Recipe
+from wildlab.flight.schema import UNITS
 from wildlab.flight.store import load_flight
-from wildlab.flight.units import UNITS
 from wildlab.geometry.georeference import pixel_to_plane
 from wildlab.geometry.mount import camera_pose
 from wildlab.paths import DATA
@@ -130,6 +130,12 @@ def folder(example):
 
 def test_it_comes_back_as_it_was_written(folder):
     assert read_camera(folder / "camera.toml") == CameraFile.model_validate(CONTENT)
+
+
+def test_a_recipe_takes_one_that_is_written_by_hand(folder):
+    (folder / "camera.toml").write_text(dump_toml({"camera": CONTENT["camera"]}))
+    import_flight(folder / "recipe.toml", None, folder / "flight")
+    assert load_flight(folder / "flight").manifest.camera.fx_px == 1159.2
 
 
 def test_a_recipe_takes_it(folder):

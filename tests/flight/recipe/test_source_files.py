@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wildlab.errors import WildlabError
-from wildlab.flight.recipe import raw
-from wildlab.flight.recipe.model import Quantity
-from wildlab.flight.recipe.raw import RawTable, numbers, packed, plain_numbers, read_delimited, texts
+from wildlab.flight import raw_files as raw
+from wildlab.flight.raw_files import RawTable, numbers, packed, plain_numbers, read_delimited, texts
+from wildlab.flight.recipes import Quantity
 
 CELLS = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=6)
 

@@ -51,8 +51,8 @@ from wildlab.flight.checks.inertial import (
     moves,
     samples,
 )
+from wildlab.flight.schema import other_units
 from wildlab.flight.store import Flight
-from wildlab.flight.units import other_units
 from wildlab.geometry.frames import Array, matrix_to_euler, quaternion_to_matrix
 from wildlab.geometry.gravity import USUAL_GRAVITY
 from wildlab.names import listed
@@ -71,6 +71,8 @@ ALONG = 0.5
 UNEXPLAINED = 5.0
 #: A heading off by less (rad) is a compass; so many standard deviations beyond it is no chance.
 HEADING_OFF, SURE = np.radians(5.0), 3.0
+#: A heading from magnetic north is the declination less, to so many deg.
+COMPASS_DEG = 2.0
 #: Accelerations (m/s^2, root mean square) that give a heading, the correlation with the forces that takes,
 #: the share of what a heading does that nothing else may do, and the blocks in time that its standard
 #: deviation is from.
@@ -202,10 +204,13 @@ def forces(flight: Flight) -> Iterator[Finding]:
         elif (error := heading_error(given)) is not None:
             by, sd = np.degrees(error)
             low, high = abs(by) - 1.96 * sd, abs(by) + 1.96 * sd
-            facts |= {"by": by, "low": low, "high": high}
+            declination = flight.manifest.magnetometer.declination_deg or 0.0
+            magnetic = abs(by + declination) < 1.96 * sd + COMPASS_DEG
+            facts |= {"by": by, "low": low, "high": high, "magnetic": magnetic, "declination": declination}
+            causes = ("declination missing",) if magnetic else ("heading off",)
             back = Rotation.from_euler("z", -error.by).as_matrix()
             turn = change_attitude(source, partial(np.matmul, back))
-            yield Finding("warning", table, "", "heading-off", facts, ("heading off",), (turn,))
+            yield Finding("warning", table, "", "heading-off", facts, causes, (turn,))
         elif before.max() > UNEXPLAINED:
             yield Finding("warning", table, "", "felt-unexplained", facts)
 
@@ -443,56 +448,68 @@ ALIKE = 0.02
 STRAIGHT = 0.8
 
 
+#: Level vectors in n, north + i east.
+Complex = NDArray[np.complex128]
+
+
 def heading(flight: Flight) -> Iterator[Finding]:
-    """Every nav source whose heading does not follow its course, where a usual mistake says why."""
+    """Every nav source whose heading does not follow its course, or that does not lean as its course bends,
+    where a usual mistake says why."""
     for source in airframe_sources(flight):
         given = headed(flight.nav[source])
         if given is None:
             continue
-        R, course, acceleration = given
-        before, leant = follows(R, course), leans(R, acceleration)
-        if before >= APART or np.abs(np.exp(1j * course).mean()) > STRAIGHT:
-            continue
-        found = []
+        R, velocity, acceleration = given
+        course = np.angle(velocity)
+        before, leant = follows(R, course), leans(R, acceleration)[0]
+        apart = leans(R, acceleration, velocity)
+        aside = before < APART and np.abs(np.exp(1j * course).mean()) <= STRAIGHT
+        turned: list[tuple[float, Mistake[Array]]] = []
+        leaning: list[tuple[float, Mistake[Array]]] = []
         for one in attitude_mistakes(f"poses.{source}"):
             undone = one.undo(R)
-            after = follows(undone, course) if undone is not None else -1.0
-            if undone is None or after < FOLLOWS:
+            if undone is None:
                 continue
-            if leans(undone, acceleration) > max(LEANS, leant + LEANS / 2):
-                found.append((after, one))
-        if found:
-            best = max(after for after, _ in found)
-            # Only the yaw is asked about: mistakes about it come first, then the one with the fewest words.
-            alike = [one for after, one in found if after > best - ALIKE]
-            named = min(alike, key=lambda one: ("yaw" not in one.cause, len(one.cause)))
-            facts = {"before": before, "n": len(course), "said": named.said, "after": best, "way": named.fix}
-            causes, correct = (f"attitude: {named.cause}",), (change_attitude(source, named.undo),)
-            yield Finding("warning", f"nav/{source}", "", "heading-not-course", facts, causes, correct)
+            after = follows(undone, course)
+            if aside and after >= FOLLOWS and leans(undone, acceleration)[0] > max(LEANS, leant + LEANS / 2):
+                turned.append((after, one))
+            if apart.max() < LEANS / 2 and (after >= FOLLOWS or before < FOLLOWS):
+                lean = leans(undone, acceleration, velocity)
+                leaning += [(lean[0], one)] if lean.min() > LEANS else []
+        for found, code, was, first in (
+            # Of the heading only the yaw is asked about: mistakes about it come first.
+            (turned, "heading-not-course", before, "yaw"),
+            (leaning, "lean-not-course", apart[0], ""),
+        ):
+            if found:
+                best = max(after for after, _ in found)
+                alike = [one for after, one in found if after > best - ALIKE]
+                named = min(alike, key=lambda one: (first not in one.cause, len(one.cause)))
+                facts = {"before": was, "n": len(course), "said": named.said, "after": best, "way": named.fix}
+                causes, correct = (f"attitude: {named.cause}",), (change_attitude(source, named.undo),)
+                yield Finding("warning", f"nav/{source}", "", code, facts, causes, correct)
+                break
 
 
-def headed(nav: pd.DataFrame) -> tuple[Array, Array, Array] | None:
-    """Attitudes (N, 3, 3), courses (N,), rad, and level accelerations (N, 2), m/s^2, where the aircraft
-    moves; None where it hardly does."""
+def headed(nav: pd.DataFrame) -> tuple[Array, Complex, Complex] | None:
+    """Attitudes (N, 3, 3), and level velocities and accelerations (N,), north + i east, m/s and m/s^2, where
+    the aircraft moves; None where it hardly does."""
     values = increasing_rows(nav, (*QUATERNION, *POSITION), ENOUGH)
     if values is None:
         return None
     t = values[:, 0]
     middle = thin(len(t), MOST_COURSES)
     half = COURSE_S / 2
-    before, here, after = (
-        np.column_stack([np.interp(t[middle] + s, t, place) for place in values[:, 5:7].T])
-        for s in (-half, 0.0, half)
-    )
+    place = values[:, 5] + 1j * values[:, 6]
+    before, here, after = (np.interp(t[middle] + s, t, place) for s in (-half, 0.0, half))
     inside = (t[middle] - half >= t[0]) & (t[middle] + half <= t[-1])
     gap = np.diff(t, append=np.inf)[middle]
     moved = (after - before) / COURSE_S
-    good = inside & (gap <= COURSE_S) & (np.hypot(*moved.T) > MOVING)
+    good = inside & (gap <= COURSE_S) & (np.abs(moved) > MOVING)
     if good.sum() < ENOUGH:
         return None
-    acceleration = (after - 2 * here + before)[good] / half**2
     R = quaternion_to_matrix(values[middle[good], 1:5])
-    return R, np.arctan2(moved[good, 1], moved[good, 0]), acceleration
+    return R, moved[good], (after - 2 * here + before)[good] / half**2
 
 
 def follows(R: Array, course: Array) -> float:
@@ -500,9 +517,21 @@ def follows(R: Array, course: Array) -> float:
     return float(np.mean(np.cos(matrix_to_euler(R)[:, 2] - course)))
 
 
-def leans(R: Array, acceleration: Array) -> float:
-    """Correlation, -1 to 1, between how the upper side leans in n and the level accelerations (N, 2)."""
-    lean = -R[:, :2, 2] + R[:, :2, 2].mean(axis=0)
-    gained = acceleration - acceleration.mean(axis=0)
-    size = np.sqrt(np.sum(lean**2) * np.sum(gained**2))
-    return float(np.sum(lean * gained) / size) if size > 0 else 0.0
+def leans(R: Array, acceleration: Complex, *others: Complex) -> Array:
+    """Correlation, -1 to 1, between how the upper side leans in n and the level accelerations, of the whole
+    and of each half, (3,), less what goes with others.
+
+    With the velocity go the drag, against which an airframe leans, too, and a steady circle, on which each of
+    its directions is a constant turn from the acceleration.
+    """
+    A = np.column_stack([np.ones(len(R)), *others])
+
+    def together(_: NDArray[np.bool_], rows: NDArray[np.bool_]) -> tuple[float]:
+        lean, gained = (
+            part[rows] - A[rows] @ np.linalg.lstsq(A[rows], part[rows], rcond=None)[0]
+            for part in (-R[:, 0, 2] - 1j * R[:, 1, 2], acceleration)
+        )
+        size = np.linalg.norm(lean) * np.linalg.norm(gained)
+        return (float((lean @ gained.conj()).real / size) if size > 0 else 0.0,)
+
+    return crosswise(len(R), 10, together)[0]

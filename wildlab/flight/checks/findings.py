@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.flight.manifest import replace_in_manifest
+from wildlab.flight.schema import UNITS
 from wildlab.flight.store import Flight
-from wildlab.flight.units import UNITS
 from wildlab.geometry.frames import (
     R_NED_ENU,
     Array,
@@ -565,7 +565,7 @@ def change_by(row: Row, unit: Any = 1.0) -> Change:
     def change(read: Array) -> Array | None:
         value = np.asarray((read if order is None else read[..., order]) * scale + shift)
         for name, limited in (("limit_read", read), ("limit", value)):
-            if name in row and np.nanmax(np.abs(limited)) > row[name]:
+            if name in row and (np.abs(limited) > row[name]).any():
                 return None
         return value
 
@@ -677,8 +677,4 @@ def axes_words(M: Array) -> str:
 
 def rotations_of_axes() -> list[Array]:
     """The 24 rotations that take axes to axes, (3, 3) each, the identity first."""
-    found: dict[bytes, Array] = {}
-    for turns in product(range(4), repeat=3):
-        R = np.round(euler_to_matrix(*(np.pi / 2 * np.array(turns)))) + 0.0
-        found.setdefault(R.tobytes(), R)
-    return list(found.values())
+    return [np.eye(3), *(M for M in other_axes() if np.linalg.det(M) > 0)]

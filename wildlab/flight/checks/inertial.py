@@ -29,6 +29,7 @@ from wildlab.flight.checks.findings import (
     Level,
     change_columns,
     finite_rows,
+    part_of,
     say,
     shift_clock,
 )
@@ -391,6 +392,8 @@ CLOSE = 1.4
 FACTOR = 10.0
 #: Sustained over a second: more than one and a half turns.
 FASTEST = 10.0  # rad/s
+#: Share of a flight that may be faster, as where it ends in a tumble.
+TUMBLING = 0.01
 #: Turning counts from here on, flying as well.
 TURNING, SLOWEST = 0.05, 5.0  # rad/s, m/s
 ENOUGH_TURNS = 10
@@ -446,6 +449,23 @@ def _rate_unit(imu: Inertial, moved: Moves | None) -> Iterator[Finding]:
     fast = np.linalg.norm(imu.mean_rate(end - 1.0, end), axis=1) if len(end) else np.zeros(1)
     if (fastest := np.nanmax(fast)) > FASTEST:
         yield Finding("problem", "imu", "w_z_rad_s", "rate-too-fast", {"turned": fastest / (2 * np.pi)})
+
+
+def turning(flight: Flight) -> Iterator[Finding]:
+    """Attitudes that turn faster than anything flies, as of angles in degrees that were read as radians."""
+    for source, nav in flight.nav.items():
+        values = None if "frame_id" in nav else increasing_rows(nav, QUATERNION, ENOUGH)
+        if values is None or not np.abs(values[:, 1:]).any(axis=1).all():
+            continue
+        R = Rotation.from_quat(values[:, 1:], scalar_first=True)
+        turned = np.cumsum((R[:-1].inv() * R[1:]).as_rotvec(), axis=0)
+        t = values[1:, 0]
+        first, last = intervals(t)
+        rate = np.linalg.norm(turned[last] - turned[first], axis=1) / (t[last] - t[first])
+        if len(rate) and (fast := rate > FASTEST).mean() > TUMBLING:
+            facts = {"turned": rate[fast].max() / (2 * np.pi), "part": part_of(f"nav/{source}")}
+            causes = ("attitude in degrees",)
+            yield Finding("problem", f"nav/{source}", "q_w", "turns-too-fast", facts, causes)
 
 
 def _gravity(imu: Inertial, moved: Moves | None) -> Iterator[Finding]:

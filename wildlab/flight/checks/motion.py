@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 from scipy.integrate import cumulative_trapezoid
+from scipy.ndimage import median_filter
 
 from wildlab.errors import WildlabError
 from wildlab.flight.checks.findings import (
@@ -301,15 +302,20 @@ def position_mistakes(flight: Flight, source: str, pair: PositionPair) -> Iterat
 
 #: A leap is over within so many seconds, at least so long (m), and so many of the usual spreads of a stretch
 #: as long.
-WITHIN_S, LEAST_M, FAR = 2.0, 5.0, 8.0
+WITHIN_S, LEAST_M, FAR = 2.0, 5.0, 12.0
 #: Places so long before and after it (s) say how far it went.
 BESIDE_S = 5.0
-#: Steps from whose median a velocity is taken where the table has none.
-STEPS = 9
+#: Rows closer than that (s) tell no more.
+FINEST_S = 0.1
+#: A velocity is the median of so many steps, over so long at least (s), where the table has none.
+STEPS, STEPS_S = 9, 3.0
 #: Rows below which nothing is told from noise; leaps beyond which a table is rough, and not leaping.
 FEWEST, MOST_LEAPS = 30, 5
-#: Causes for which a leap may be mistaken, by how they begin.
-_CLOCKS = ("clock", "leap seconds")
+
+
+#: Receivers leap by up to 20 m now and then; what is beyond this (m) is said in any case, less only where a
+#: clock would be blamed for it, by how such causes begin.
+LARGE_M, CLOCKS = 25.0, ("clock", "leap seconds")
 
 
 class Leap(NamedTuple):
@@ -341,18 +347,21 @@ def find_leaps(table: pd.DataFrame, name: str = "") -> list[Leap]:
     has_velocity = VELOCITY[0] in table
     values = table[["time_s", *POSITION, *(VELOCITY if has_velocity else [])]].to_numpy(float)
     values = values[np.isfinite(values[:, :4]).all(axis=1)]
-    t, p = values[:, 0], values[:, 1:4]
-    if len(t) < FEWEST or (np.diff(t) <= 0).any():
+    steps_s = np.diff(values[:, 0])
+    if len(steps_s) < FEWEST or (steps_s <= 0).any() or (usual := float(np.median(steps_s))) > WITHIN_S:
         return []
+    values = values[:: max(1, int(FINEST_S / usual))]
+    usual = max(usual, FINEST_S)
+    t, p = values[:, 0], values[:, 1:4]
     step = np.diff(t)[:, None]
     gone = np.diff(p, axis=0)
     if has_velocity and np.isfinite(values[:, 4:]).all():
         expected = (values[1:, 4:] + values[:-1, 4:]) / 2 * step
     else:
-        padded = np.pad(gone / step, ((STEPS // 2, STEPS // 2), (0, 0)), mode="edge")
-        expected = np.median(np.lib.stride_tricks.sliding_window_view(padded, STEPS, axis=0), axis=-1) * step
+        steps = max(STEPS, 1 + 2 * int(STEPS_S / usual / 2))
+        expected = median_filter(gone / step, (steps, 1), mode="nearest") * step
     # Behind a gap nobody knows how far it should have gone.
-    unexplained = np.where(step > max(WITHIN_S, 3 * np.median(step)), 0.0, gone - expected)
+    unexplained = np.where(step > max(WITHIN_S, 3 * usual), 0.0, gone - expected)
     left = np.concatenate([np.zeros((1, 3)), np.cumsum(unexplained, axis=0)])
     end = np.minimum(np.searchsorted(t, t + WITHIN_S), len(t) - 1)
     size = np.linalg.norm(left[end] - left, axis=1)
@@ -374,11 +383,11 @@ def find_leaps(table: pd.DataFrame, name: str = "") -> list[Leap]:
 
 def without_leaps(flight: Flight) -> tuple[Flight, list[Leap]]:
     """The flight with the leaps of all its positions taken off, and these."""
-    leaps: list[Leap] = []
+    every: list[Leap] = []
 
     def smooth(table: pd.DataFrame, name: str) -> pd.DataFrame:
         found = find_leaps(table, name)
-        leaps.extend(found)
+        every.extend(found)
         place = table[list(POSITION)].to_numpy(float)
         for one in found:
             place = np.where(table["time_s"].to_numpy(float)[:, None] >= one.time_s, place - one.by, place)
@@ -395,22 +404,15 @@ def without_leaps(flight: Flight) -> tuple[Flight, list[Leap]]:
         targets = flight.truth.groupby("target_id", sort=False)
         parts = [smooth(rows, f"truth of {target}") for target, rows in targets]
         tables["truth"] = pd.concat(parts).loc[flight.truth.index]
-    return replace(flight, nav=nav, tables=tables), leaps
+    return replace(flight, nav=nav, tables=tables), every
 
 
-def distinguish_leaps(check: Callable[[Flight], Iterable[Finding]], flight: Flight) -> list[Finding]:
-    """What a check finds; where it names a clock and a position leaps: the leaps, and what is left."""
-    found = list(check(flight))
-    if not any(cause.startswith(_CLOCKS) for one in found for cause in one.causes):
-        return found
-    smooth, leaps = without_leaps(flight)
-    return [*map(_leap_finding, leaps), *check(smooth)] if leaps else found
-
-
-def _leap_finding(one: Leap) -> Finding:
-    table, _, target = one.table.partition(" of ")
-    facts = {"of": f" of {target}" if target else "", "size": np.linalg.norm(one.by), "at": one.time_s}
-    return Finding("problem", table, "north_m", "leap", facts, (LEAP,))
+def leaps(found: Iterable[Leap]) -> Iterator[Finding]:
+    """What is said of leaps."""
+    for one in found:
+        table, _, target = one.table.partition(" of ")
+        facts = {"of": f" of {target}" if target else "", "size": np.linalg.norm(one.by), "at": one.time_s}
+        yield Finding("problem", table, "north_m", "leap", facts, (LEAP,))
 
 
 # -- where the flight is: about its origin, and its tables near each other

@@ -12,7 +12,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,9 +22,10 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.clock_fitting import fit_steady
+from wildlab.flight.clock_fitting import ClockFit, fit_steady, week_to_utc
 from wildlab.flight.readers.log import (
     ANGLES,
+    CUT_OFF,
     FIELD,
     FIX_PLANE,
     FIX_SPACE,
@@ -32,12 +33,11 @@ from wildlab.flight.readers.log import (
     VELOCITY,
     WORLD,
     Array,
-    Clock,
     Columns,
-    Decoded,
     Mask,
     Messages,
-    Readings,
+    RawLog,
+    Stream,
     any_of,
     at_times,
     holding,
@@ -47,9 +47,8 @@ from wildlab.flight.readers.log import (
     placed,
     usable,
 )
-from wildlab.flight.readers.text import plural
+from wildlab.flight.readers.text import plural, told
 from wildlab.flight.schema import BOUNDS
-from wildlab.flight.units import week_to_utc
 
 Bytes = NDArray[np.uint8]
 Index = NDArray[np.int64]
@@ -131,11 +130,13 @@ class MessageTable(Messages):
 
 
 class Records(NamedTuple):
-    """Messages of a binary log by name, bytes of no message, and in how many stretches these lie."""
+    """Messages of a binary log by name, bytes of no message, in how many stretches these lie, and whether the
+    log ends within a message."""
 
     tables: dict[str, MessageTable]
     lost_bytes: int
     places: int
+    cut: bool
 
 
 def sniff(head: bytes) -> bool:
@@ -168,8 +169,7 @@ def read_records(data: bytes) -> Records:
     ends = heads + np.array([one.length for one in known], np.int64)[which]
     begins = _boundaries(heads, ends, len(raw))
     heads, which, ends = heads[begins], which[begins], ends[begins]
-    lost, places = _left_over(raw, heads, ends)
-    return Records(_tables(raw, known, heads, which), lost, places)
+    return Records(_tables(raw, known, heads, which), *_left_over(raw, heads, ends))
 
 
 def _definitions(data: bytes, raw: Bytes, heads: Index) -> tuple[list[Definition], Index]:
@@ -239,14 +239,15 @@ def _boundaries(heads: Index, ends: Index, size: int) -> Mask:
     return begins
 
 
-def _left_over(raw: Bytes, heads: Index, ends: Index) -> tuple[int, int]:
-    """Bytes between messages, and in how many stretches they lie; filling at the end is none."""
+def _left_over(raw: Bytes, heads: Index, ends: Index) -> tuple[int, int, bool]:
+    """Bytes between messages, in how many stretches they lie, and whether some are at the end, where filling
+    is none."""
     starts, stops = np.concatenate([[0], ends]), np.concatenate([heads, [len(raw)]])
     gaps = stops - starts
     rest = raw[starts[-1] :]
     if len(rest) and rest[0] in (0, 255) and (rest == rest[0]).all():
         gaps[-1] = 0
-    return int(gaps.sum()), int((gaps > 0).sum())
+    return int(gaps.sum()), int((gaps > 0).sum()), bool(gaps[-1] > 0)
 
 
 def _tables(raw: Bytes, known: list[Definition], heads: Index, which: Index) -> dict[str, MessageTable]:
@@ -421,7 +422,7 @@ class ArdupilotLog(NamedTuple):
     receiver: MessageTable | None
     rows: NDArray[np.int64]
     stamps: Array
-    clock: Clock | None
+    fit: ClockFit | None
 
     def sensors(self, *names: str) -> list[MessageTable]:
         """One table per sensor, of messages by these names, in their order."""
@@ -442,20 +443,18 @@ class ArdupilotLog(NamedTuple):
 
     def utc(self, stamps: Array) -> Array:
         """(N,) s since 1970 of stamps; NaN where UTC is not known."""
-        if self.clock is None or not self.clock.base:
-            return np.full(len(stamps), np.nan)
-        return np.asarray(self.clock.offset_s + self.clock.rate * stamps)
+        return np.full(len(stamps), np.nan) if self.fit is None else self.fit.to_reference(stamps)
 
     def readings(
         self, table: MessageTable, columns: dict[str, Array], unusable: dict[str, Mask] | None = None
-    ) -> Readings:
+    ) -> Stream:
         """Columns of messages with their times; all rows count, with a place or without."""
         stamps = self.of(table)
         times = {"time_s": self.utc(stamps), "time_log_s": stamps}
-        return Readings(times | columns, table.rows, self.counted_in, unusable or {}, anywhere=True)
+        return Stream(times | columns, table.rows, self.counted_in, unusable or {}, anywhere=True)
 
 
-def decode(path: Path, data: bytes, zone: str | None) -> Decoded:
+def decode(path: Path, data: bytes, zone: str | None) -> RawLog:
     """A DataFlash log, its rows counted in messages.
 
     Raises
@@ -466,10 +465,11 @@ def decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     found = read_records(data)
     where = plural(found.places, "place")
     lost = [(found.lost_bytes, "byte", f"of {len(data)} in {where} belong to no message")]
-    return _decoded(path, found.tables, "message", lost, "")
+    made = _decoded(path, found.tables, "message", lost, "")
+    return replace(made, notes=[*made.notes, *holding({CUT_OFF: found.cut})])
 
 
-def text_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
+def text_decode(path: Path, data: bytes, zone: str | None) -> RawLog:
     """A DataFlash log as text, its rows counted in lines; errors as of `decode`."""
     tables, lost, title = read_lines(data)
     return _decoded(path, tables, "line", lost, title)
@@ -483,7 +483,7 @@ def _decoded(
     counted_in: str,
     lost: Sequence[tuple[int, str, str]],
     title: str,
-) -> Decoded:
+) -> RawLog:
     """A log of messages; `title` is what the file says of the vehicle outside of them."""
     if not set(tables) - {"FMT"}:
         problem = "holds no message of ArduPilot"
@@ -510,7 +510,8 @@ def _decoded(
     said = [text for name, field in (("VER", "FWS"), ("MSG", "Message")) if name in tables
             for text in tables[name].texts(field)]  # fmt: skip
     vehicle = next((match.group() for text in (*said, title) if (match := _VEHICLE.search(text))), "")
-    return Decoded(parts, vehicle, log.clock, [*lost, *left_out], _notes(log, parts, receivers, place))
+    clock = "GPS weeks" if log.fit else ""
+    return RawLog(parts, vehicle, clock, told(*lost, *left_out), _notes(log, parts, receivers, place))
 
 
 # -- times
@@ -558,13 +559,12 @@ def _clocked(tables: dict[str, MessageTable], counted_in: str) -> tuple[Ardupilo
     if anchor is None:
         return log, receivers
     kept = in_order(anchor[1])
-    log = log._replace(rows=anchor[0].rows[kept], stamps=anchor[1][kept], clock=Clock(""))
+    log = log._replace(rows=anchor[0].rows[kept], stamps=anchor[1][kept])
     if receiver is not None:
         own, utc, fixed = log.of(receiver), gps_utc(receiver), _true_fix(receiver)
         pairs = in_order(own, fixed) & in_order(utc, fixed)
         if pairs.any():
-            fit = fit_steady(own[pairs], utc[pairs], resolution_s=LOOP_S)
-            log = log._replace(clock=Clock.fitted("GPS weeks", fit))
+            log = log._replace(fit=fit_steady(own[pairs], utc[pairs], resolution_s=LOOP_S))
     return log, receivers
 
 
@@ -629,7 +629,7 @@ class PlaceTrack(NamedTuple):
         return at_times(self.stamps, self.columns, stamps, f"messages {self.name}", ~high)
 
 
-def _gnss(log: ArdupilotLog, receiver: MessageTable) -> Readings:
+def _gnss(log: ArdupilotLog, receiver: MessageTable) -> Stream:
     """Satellite positions of one receiver, with what messages GPA say of how sure it was."""
     stamps, columns = log.of(receiver), receiver.columns(GNSS)
     speed = receiver.get("Spd")
@@ -648,7 +648,7 @@ def _gnss(log: ArdupilotLog, receiver: MessageTable) -> Readings:
         # Its parts to the north and east may each be possible.
         "impossible speed": speed > BOUNDS["speed"][1],
     }
-    return Readings(columns, receiver.rows, log.counted_in, unusable)
+    return Stream(columns, receiver.rows, log.counted_in, unusable)
 
 
 def _accuracies(receiver: MessageTable, log: ArdupilotLog, stamps: Array, down: Array) -> dict[str, Array]:
@@ -685,11 +685,11 @@ def _place_of(name: str, log: ArdupilotLog) -> PlaceTrack | None:
     return place if np.isfinite(place.at(place.stamps)["latitude_deg"]).any() else None
 
 
-def _place_of_gnss(gnss: Readings, receiver: MessageTable, log: ArdupilotLog) -> PlaceTrack | None:
+def _place_of_gnss(gnss: Stream, receiver: MessageTable, log: ArdupilotLog) -> PlaceTrack | None:
     """Positions of the satellite receiver; heights above home where its messages have the autopilot's."""
-    stamps, clock = gnss.columns["time_log_s"], log.clock
-    if clock is not None and clock.base:
-        stamps = (gnss.columns["time_s"] - clock.offset_s) / clock.rate
+    stamps = gnss.columns["time_log_s"]
+    if log.fit is not None:
+        stamps = (gnss.columns["time_s"] - log.fit.offset_s) / log.fit.rate
     used = usable("gnss", gnss) & np.isfinite(stamps)
     columns = {one: gnss.columns[one][used] for one in _PLACE[:3]}
     columns["height_home_m"] = receiver.get("RelAlt", "RAlt")[used]
@@ -722,7 +722,7 @@ SENSORS: dict[str, tuple[tuple[str, ...], str, dict[str, str], float]] = {
 }  # fmt: skip
 
 
-def _sensor(log: ArdupilotLog, part: str) -> Readings | None:
+def _sensor(log: ArdupilotLog, part: str) -> Stream | None:
     """A part of the first sensor of its kind, as `SENSORS` has it; None where the log has none."""
     names, needed, fields, factor = SENSORS[part]
     table = log.first(names, *needed.split())
@@ -736,7 +736,7 @@ def _sensor(log: ArdupilotLog, part: str) -> Readings | None:
     return log.readings(table, columns)
 
 
-def _poses(log: ArdupilotLog, place: PlaceTrack | None) -> Readings | None:
+def _poses(log: ArdupilotLog, place: PlaceTrack | None) -> Stream | None:
     """Attitudes with the positions at their times; None where the log has no attitude.
 
     Attitudes are those of messages ATT, else quaternions of XKQ or NKQ, else of AHR2.
@@ -758,10 +758,10 @@ def _poses(log: ArdupilotLog, place: PlaceTrack | None) -> Readings | None:
         columns |= at_times(log.of(moving), v, stamps, f"messages {moving.name}")
     high = any_of([np.isfinite(where[one]) for one in _PLACE[2:]], len(table))
     low = np.isfinite(where["latitude_deg"]) & ~high
-    return log.readings(table, columns | where, {"no height": low})._replace(anywhere=False)
+    return replace(log.readings(table, columns | where, {"no height": low}), anywhere=False)
 
 
-def _imu(log: ArdupilotLog) -> Readings | None:
+def _imu(log: ArdupilotLog) -> Stream | None:
     """Specific force and rates of turn of the first IMU; None where the log has none."""
     f, w = (named(IMU[at : at + 3], (f"{start}{axis}" for axis in "XYZ"))
             for at, start in ((0, "Acc"), (3, "Gyr")))  # fmt: skip
@@ -777,18 +777,19 @@ def _imu(log: ArdupilotLog) -> Readings | None:
 
 
 def _notes(
-    log: ArdupilotLog, parts: dict[str, Readings], receivers: list[MessageTable], place: PlaceTrack | None
+    log: ArdupilotLog, parts: dict[str, Stream], receivers: list[MessageTable], place: PlaceTrack | None
 ) -> list[str]:
-    clock, receiver = log.clock, next((i for i, one in enumerate(receivers, 1) if one is log.receiver), 0)
+    stamped = len(log.rows)
+    receiver = next((i for i, one in enumerate(receivers, 1) if one is log.receiver), 0)
     unstamped = [
         one
         for one in ("GPS", "ATT", "IMU", "CAM", "TRIG")
-        if clock is not None and one in log.tables and own_stamps(log.tables[one]) is None
+        if stamped and one in log.tables and own_stamps(log.tables[one]) is None
     ]
     notes = {
         f"messages {', '.join(unstamped)} have no stamps: times are those around them": unstamped,
-        "its messages have no stamps": clock is None,
-        "no satellite fix tells UTC": clock is not None and not clock.base,
+        "its messages have no stamps": not stamped,
+        "no satellite fix tells UTC": stamped and log.fit is None,
         f"positions of poses are those of messages {place and place.name}": "poses" in parts and place,
         f"of {len(receivers)} satellite receivers number {receiver} is used": len(receivers) > 1,
         "heights of CAM are left out: nothing says what they count from": (

@@ -31,9 +31,9 @@ from wildlab.flight.readers.labels import (
     read_yolo_folder,
     way_of,
 )
-from wildlab.flight.readers.log import Decoded, Readings, holding, named
+from wildlab.flight.readers.log import RawLog, Stream, holding, named
 from wildlab.flight.readers.photos import read_tags, size_of
-from wildlab.flight.readers.text import header_of, number, parse_xml, plural
+from wildlab.flight.readers.text import header_of, number, parse_xml, plural, told
 
 #: Attributes of CVAT that name a thing more closely than its label.
 ATTRIBUTES = frozenset({"name", "target", "target_id", "id", "marker"})
@@ -53,7 +53,7 @@ def clicks_sniff(head: bytes) -> bool:
     return bool(set(bare_names(IMAGE_COLUMNS)) & set(names)) and way_of(names, clicks=True) is not None
 
 
-def clicks_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
+def clicks_decode(path: Path, data: bytes, zone: str | None) -> RawLog:
     """Clicks and boxes of one file; images whose sizes are wanted lie beside it.
 
     Raises
@@ -67,7 +67,7 @@ def clicks_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     return _decoded(_cvat(data, path) if start == b"<" else read_table(data, path, clicks=True), path, path)
 
 
-def folder_decode(folder: Path, zone: str | None) -> Decoded:
+def folder_decode(folder: Path, zone: str | None) -> RawLog:
     """Boxes of a folder of YOLO's text files, one for each image; ``image`` is its name without the ending.
 
     Raises
@@ -78,7 +78,7 @@ def folder_decode(folder: Path, zone: str | None) -> Decoded:
     return _decoded(read_yolo_folder(folder), folder, folder)
 
 
-def _decoded(marked: Marked, path: Path, folder: Path) -> Decoded:
+def _decoded(marked: Marked, path: Path, folder: Path) -> RawLog:
     crowd = marked.table["crowd"].astype(bool)
     table = marked.table[~crowd]
     if not len(table):
@@ -111,8 +111,8 @@ def _decoded(marked: Marked, path: Path, folder: Path) -> Decoded:
     }
     lost = [(count, "thing", f"left out: {what}") for what, count in marked.left_out.items()]
     lost.append((int(crowd.sum()), "region", "of many that are not told apart"))
-    part = Readings(columns, table["row"], marked.counted_in, unusable)
-    return Decoded({"clicks": part}, lost=lost, notes=holding(notes))
+    part = Stream(columns, table["row"], marked.counted_in, unusable)
+    return RawLog({"clicks": part}, lost=told(*lost), notes=holding(notes))
 
 
 def sizes_beside(folder: Path, names: Iterable[str]) -> dict[str, tuple[float, float]]:
@@ -131,13 +131,8 @@ def sizes_beside(folder: Path, names: Iterable[str]) -> dict[str, tuple[float, f
     dict
         By those names that an image was found for.
     """
-    parts = folder.parts
-    above = [
-        Path(*parts[:at], "images", *parts[at + 1 :])
-        for at in range(len(parts) - 1, max(len(parts) - 4, 0), -1)
-        if parts[at] == "labels"
-    ]
-    every = dict.fromkeys([folder, folder / "images", folder.parent / "images", *above])
+    swapped = Path(*("images" if one == "labels" else one for one in folder.parts))
+    every = dict.fromkeys([folder, folder / "images", folder.parent / "images", swapped])
     places = [one for one in every if one.is_dir()]
     listed: dict[str, Path] = {}
     for place in reversed(places):

@@ -25,17 +25,17 @@ import numpy as np
 import pandas as pd
 
 from wildlab.errors import WildlabError
-from wildlab.flight.clock_fitting import ClockFit, fit_clock
+from wildlab.flight.clock_fitting import WEEK_S, ClockFit, fit_clock, wall_to_utc, week_to_utc
 from wildlab.flight.readers.log import (
     ANGLES,
     PLACE,
+    UTC_OF_LOG,
     VELOCITY,
     WORLD,
     Array,
-    Clock,
-    Decoded,
     Mask,
-    Readings,
+    RawLog,
+    Stream,
     holding,
     named,
 )
@@ -48,8 +48,8 @@ from wildlab.flight.readers.text import (
     plural,
     read_text_table,
     stamp_s,
+    told,
 )
-from wildlab.flight.units import WEEK_S, wall_to_utc, week_to_utc
 
 #: What is said of a clock without a zone.
 NO_ZONE = "local time without a zone"
@@ -80,7 +80,7 @@ def srt_sniff(head: bytes) -> bool:
     return _CODES.search(text) is not None and _TRACE.search(text) is not None
 
 
-def srt_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
+def srt_decode(path: Path, data: bytes, zone: str | None) -> RawLog:
     """Subtitles of a video, a row each.
 
     Without a zone, rows with a wall clock are marked; where there is no clock at all, stamps are the
@@ -108,18 +108,18 @@ def srt_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     columns = {str(name): one.to_numpy(float) for name, one in table.items()}
     times, clock, reasons = _times(columns["code"], columns["wall"], zone)
     notes = {
-        "it has no clock: stamps count from the beginning of the video": clock is None,
+        "it has no clock: stamps count from the beginning of the video": not clock,
         "its clock is local time without a zone: state the zone": NO_ZONE in reasons,
         "altitude is taken as height above take-off": columns["vague"].any(),
     }
     parts = {"gnss": (*_PLACE, "satellites"), "poses": (*_PLACE, *_AIRCRAFT), "gimbal": _GIMBAL}
     made = {
-        part: Readings(times | {name: columns[name] for name in names}, rows, "subtitle", reasons)
+        part: Stream(times | {name: columns[name] for name in names}, rows, "subtitle", reasons)
         for part, names in parts.items()
         if np.isfinite(columns[names[-1]]).any() or part == "gnss"
     }
-    lost = [(len(found) - len(rows), "subtitle", f"of {len(found)} without a place")]
-    return Decoded(made, clock=clock, lost=lost, notes=holding(notes))
+    lost = told((len(found) - len(rows), "subtitle", f"of {len(found)} without a place"))
+    return RawLog(made, clock=clock, lost=lost, notes=holding(notes))
 
 
 def _block(code: re.Match[str], body: str) -> dict[str, float]:
@@ -179,19 +179,16 @@ def _wall(found: re.Match[str] | None) -> float:
     return calendar_s(*found.groups()[:6]) + int(digits) * 1e-6
 
 
-def _times(
-    code: Array, wall: Array, zone: str | None
-) -> tuple[dict[str, Array], Clock | None, dict[str, Mask]]:
+def _times(code: Array, wall: Array, zone: str | None) -> tuple[dict[str, Array], str, dict[str, Mask]]:
     none = np.full(len(wall), np.nan)
     clocked = np.isfinite(wall)
     if not clocked.any():
-        return {"time_s": none, "time_log_s": code}, None, {}
+        return {"time_s": none, "time_log_s": code}, "", {}
     if zone is None:
         times = {"time_s": none, "time_log_s": wall}
-        return times, Clock(NO_ZONE, pairs=int(clocked.sum())), {NO_ZONE: clocked, "no time": ~clocked}
+        return times, NO_ZONE, {NO_ZONE: clocked, "no time": ~clocked}
     utc = wall_to_utc(wall, zone)
-    clock = Clock.shifted(f"wall clock of zone {zone[:60]}", wall, utc)
-    return {"time_s": utc, "time_log_s": wall}, clock, {}
+    return {"time_s": utc, "time_log_s": wall}, f"wall clock of zone {zone[:60]}", {}
 
 
 # -- records of images
@@ -215,7 +212,7 @@ def mrk_sniff(head: bytes) -> bool:
     return any(_ROW.match(line) for line in decode(head).splitlines()[:5])
 
 
-def mrk_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
+def mrk_decode(path: Path, data: bytes, zone: str | None) -> RawLog:
     """Records of images, a line each.
 
     Raises
@@ -243,10 +240,10 @@ def mrk_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
         "sd_vertical_m": up,
         "fix": fix,
     }
-    return Decoded(
-        {"triggers": Readings(columns, [at for at, _ in found], "line")},
-        clock=Clock.shifted("GPS weeks", columns["time_log_s"], time),
-        lost=[(len(lines) - len(found), "line", f"of {len(lines)} could not be read")],
+    return RawLog(
+        {"triggers": Stream(columns, [at for at, _ in found], "line")},
+        clock="GPS weeks",
+        lost=told((len(lines) - len(found), "line", f"of {len(lines)} could not be read")),
         notes=["places are those of the camera, not the antenna"],
     )
 
@@ -294,7 +291,6 @@ _COLUMNS = {
 }
 #: A gimbal that keeps its heading within this, while the aircraft turns by more than that, degrees.
 _STILL_DEG, _TURNED_DEG = 2.0, 45.0
-UTC_BASE = "UTC of the log"
 #: The counter and the clock part by more than this in a pause only, s; fewer changes of second make no fit.
 _PAUSE_S, _FEW = 1.5, 10
 
@@ -304,7 +300,7 @@ def airdata_sniff(head: bytes) -> bool:
     return {"datetime_utc", "latitude", "longitude"} <= set(header_of(head))
 
 
-def airdata_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
+def airdata_decode(path: Path, data: bytes, zone: str | None) -> RawLog:
     """A flight record, a row for each line.
 
     Raises
@@ -330,12 +326,12 @@ def airdata_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     whole = np.array([known[one] for one in clocks])
     notes: list[str] = []
     own = columns.get("time_log_s", np.full(len(whole), np.nan))
-    time, clock = _fraction(own, whole, notes)
+    time = _fraction(own, whole, notes)
     times = {"time_s": time, "time_log_s": own if np.isfinite(own).any() else whole}
-    return Decoded(
+    return RawLog(
         _parts(times, columns, np.array(table.lines), notes),
-        clock=clock,
-        lost=table.lost(),
+        clock=UTC_OF_LOG if np.isfinite(whole).any() else "",
+        lost=told(table.lost()),
         notes=notes,
     )
 
@@ -345,7 +341,7 @@ def _parts(
     columns: dict[str, Array],
     rows: Array,
     notes: list[str],
-) -> dict[str, Readings]:
+) -> dict[str, Stream]:
     def of(*names: str) -> dict[str, Array]:
         return times | {name: columns[name] for name in names if name in columns}
 
@@ -358,11 +354,11 @@ def _parts(
             notes += _heading_that_stands(columns["yaw_world_deg"], columns["yaw_deg"])
     photo = np.nan_to_num(columns.get("photo", np.zeros(len(rows)))) > 0
     taken = photo & ~np.r_[False, photo[:-1]]
-    made = {name: Readings(one, rows, "line") for name, one in parts.items()}
+    made = {name: Stream(one, rows, "line") for name, one in parts.items()}
     if taken.any():
         own = {name: values[taken] for name, values in of(*PLACE, *ANGLES).items()}
         own["number"] = np.arange(1.0, taken.sum() + 1)
-        made["triggers"] = Readings(own, rows[taken], "line")
+        made["triggers"] = Stream(own, rows[taken], "line")
     return made
 
 
@@ -398,17 +394,17 @@ def _unit(path: Path, ours: str, column: tuple[str, str]) -> float:
     return _UNITS[unit]
 
 
-def _fraction(own: Array, whole: Array, notes: list[str]) -> tuple[Array, Clock | None]:
+def _fraction(own: Array, whole: Array, notes: list[str]) -> Array:
     """Stamps in whole seconds made finer by a counter: where a second changes, it has just begun."""
     both = np.flatnonzero(np.isfinite(own) & np.isfinite(whole))
     if not np.isfinite(whole).any():
-        return whole, None
+        return whole
     changes = np.flatnonzero(np.diff(whole[both]) > 0)
     before, after = both[changes], both[changes + 1]
     near = (own[after] > own[before]) & (own[after] - own[before] < 1.0)
     before, after = before[near], after[near]
     if len(after) < 3 or (whole[both] % 1 > 0).any():
-        return whole, Clock(UTC_BASE, pairs=len(both))
+        return whole
     reference, middle = whole[after], (own[before] + own[after]) / 2
     # Nothing but a pause, or a wrong row, parts the two by more than the second that one of them is coarse.
     lack = (whole - own)[both]
@@ -429,11 +425,4 @@ def _fraction(own: Array, whole: Array, notes: list[str]) -> tuple[Array, Clock 
             f"the counter of milliseconds stood still {plural(len(stood), 'time')}, "
             f"{sum(stood):.1f} s together: each stretch has its own fit"
         )
-    if not fits:
-        return time, Clock(UTC_BASE, spread_s=1 / np.sqrt(12), largest_s=0.5, pairs=len(both))
-    left = np.concatenate([one.residual[one.used] for one in fits])
-    fit = max(fits, key=lambda one: int(one.used.sum()))
-    spread = max(one.spread_s for one in fits)
-    return time, Clock(
-        UTC_BASE, fit.rate, fit.offset_s, spread, float(np.abs(left).max()), len(left), fit.rate_sd
-    )
+    return time

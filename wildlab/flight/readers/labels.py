@@ -674,7 +674,8 @@ def read_table(data: bytes, path: Path, *, group: str | None = None, clicks: boo
     belongs = None if numbered is None else _stretches(names)
     if group is not None:
         belongs = texts(header.index(group))
-    left_out = {rest: count for count, _, rest in table.lost() if count}
+    count, _, rest = table.lost()
+    left_out = _counted(rest, count)
     return Marked(
         "CSV",
         found[~empty & ~twice],

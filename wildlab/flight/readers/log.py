@@ -9,20 +9,18 @@ strictly increase.
 
 from __future__ import annotations
 
-import math
 from bisect import bisect_left
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.flight.clock_fitting import ClockFit
+from wildlab.flight.clock_fitting import GPS_START_S
 from wildlab.flight.clocks import between
 from wildlab.flight.readers.text import LATEST_S, decode, plural
 from wildlab.flight.schema import BOUNDS
-from wildlab.flight.units import GPS_START_S
 from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
 
 Array = NDArray[np.float64]
@@ -68,7 +66,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     # Images with what stands in them; `time_log_s` is the camera's own wall clock as if it were UTC.
     "photos": (
         *("file", *PLACE, *ANGLES, *WORLD, "sd_horizontal_m", "sd_vertical_m", "fix"),
-        *("width_px", "height_px", "focal_mm", "focal_px", "focal_35mm", "focal_from", "camera"),
+        *("width_px", "height_px", "focal_px", "focal_from", "camera"),
     ),
     # Surveyed points that do not move.
     "marks": ("name", *PLACE, "sd_horizontal_m", "sd_vertical_m"),
@@ -78,49 +76,10 @@ PARTS: dict[str, tuple[str, ...]] = {
         *("box_u_px", "box_v_px", "box_width_px", "box_height_px"),
     ),
 }
+#: What UTC was known from where rows state it.
+UTC_OF_LOG = "UTC of the log"
 #: Columns of text; all others are numbers.
 TEXTS = frozenset({"why", "file", "camera", "focal_from", "name", "image"})
-
-
-class Clock(NamedTuple):
-    """How the log's own stamps were brought to UTC.
-
-    Attributes
-    ----------
-    base
-        What UTC was known from, in a clause: ``"GPS weeks"``, ``"GPS time of messages GPS"``, ``"times of
-        receipt"``, ``"UTC of the log"``, ``"local time without a zone"``; ``""`` where it was not.
-    rate
-        Seconds of UTC for a second of the log's clock.
-    offset_s
-        UTC of the log's zero, s since 1970.
-    spread_s, largest_s
-        Robust standard deviation and largest absolute value of what is left over.
-    pairs
-        From how many pairs of stamps.
-    rate_sd
-        Standard deviation of the rate; NaN where it was not estimated, or taken for 1.
-    """
-
-    base: str
-    rate: float = 1.0
-    offset_s: float = 0.0
-    spread_s: float = 0.0
-    largest_s: float = 0.0
-    pairs: int = 0
-    rate_sd: float = math.nan
-
-    @classmethod
-    def fitted(cls, base: str, fit: ClockFit) -> Clock:
-        """As a fit of pairs of stamps has it."""
-        left = float(np.abs(fit.residual[fit.used]).max())
-        return cls(base, fit.rate, fit.offset_s, fit.spread_s, left, int(fit.used.sum()), fit.rate_sd)
-
-    @classmethod
-    def shifted(cls, base: str, own: Array, utc: Array) -> Clock | None:
-        """As pairs of stamps (N,) have it whose rate is 1, by their median; None where there is none."""
-        apart = (utc - own)[np.isfinite(utc - own)]
-        return cls(base, offset_s=float(np.median(apart)), pairs=len(apart)) if len(apart) else None
 
 
 def named(names: Iterable[str], values: Iterable[Any]) -> dict[str, Any]:
@@ -145,8 +104,9 @@ def any_of(masks: Iterable[ArrayLike], count: int) -> Mask:
     return np.asarray(np.logical_or.reduce([*none, *masks]), bool)
 
 
-class Readings(NamedTuple):
-    """One part as a reader decodes it, before anything is judged.
+@dataclass(frozen=True)
+class Stream:
+    """One part of a log; once it is judged, with the columns of `MARKS`.
 
     Attributes
     ----------
@@ -163,46 +123,13 @@ class Readings(NamedTuple):
     """
 
     columns: dict[str, Any]
-    rows: ArrayLike | None = None
+    rows: Any = None
     counted_in: str = "message"
-    unusable: Mapping[str, Mask] = {}
+    unusable: Mapping[str, Mask] = field(default_factory=dict)
     anywhere: bool = False
 
-
-@dataclass(frozen=True)
-class Decoded:
-    """What `decode` of a format gives.
-
-    Attributes
-    ----------
-    parts
-        By name, see `PARTS`.
-    vehicle, clock
-        As of `RawLog`.
-    lost
-        How much of what could not be read: a number, what it counts, and the rest of the sentence. Of none
-        nothing is said.
-    notes
-        Sentences on what a user should know of it.
-    """
-
-    parts: dict[str, Readings]
-    vehicle: str = ""
-    clock: Clock | None = None
-    lost: Sequence[tuple[int, str, str]] = ()
-    notes: Sequence[str] = ()
-
-
-@dataclass(frozen=True)
-class Stream:
-    """One part of a log: its columns (N,), and for each row where it stands in the file, counted from 1."""
-
-    columns: dict[str, NDArray[Any]]
-    rows: NDArray[np.int64]
-    counted_in: str = "message"
-
     def __len__(self) -> int:
-        return len(self.rows)
+        return len(next(iter(self.columns.values())))
 
     @property
     def used(self) -> Mask:
@@ -210,38 +137,35 @@ class Stream:
         return np.asarray(self.columns["use"] == 1.0)
 
     def take(self, rows: NDArray[Any]) -> Stream:
-        """The rows that a mask or an index picks."""
-        return Stream(
-            {name: one[rows] for name, one in self.columns.items()}, self.rows[rows], self.counted_in
-        )
+        """The rows that a mask or an index picks, of what was judged."""
+        columns = {name: one[rows] for name, one in self.columns.items()}
+        return Stream(columns, self.rows[rows], self.counted_in)
 
 
 @dataclass(frozen=True)
 class RawLog:
-    """A log, read.
+    """A log, as `decode` of its format gives it, and judged.
 
     Attributes
     ----------
-    format
-        As in `formats.FORMATS`.
     parts
-        By name, see `PARTS`; only those that the log has rows of.
+        By name, see `PARTS`; once judged only those that the log has rows of.
     vehicle
         What it says of what carried it, in its words: ``"ArduCopter V3.1.3"``. Empty: nothing.
     clock
-        How its stamps became UTC; None where it has none that run.
+        What UTC was known from, in a clause: ``"GPS weeks"``, ``"times of receipt"``, ``"local time without a
+        zone"``; empty where it was not.
     lost
         Sentences on what could not be read, each with how much of it.
     notes
         Sentences on what a user should know of it.
     """
 
-    format: str
-    parts: dict[str, Stream] = field(default_factory=dict)
+    parts: dict[str, Stream]
     vehicle: str = ""
-    clock: Clock | None = None
-    lost: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
+    clock: str = ""
+    lost: Sequence[str] = ()
+    notes: Sequence[str] = ()
 
 
 def make_stream(
@@ -289,8 +213,7 @@ def make_stream(
     for reason, holds in (unusable or {}).items():
         why[np.asarray(holds, bool) & (why == "")] = reason
     at = np.arange(1, count + 1) if rows is None else np.asarray(rows, np.int64)
-    marks: dict[str, NDArray[Any]] = {"use": (why == "").astype(np.float64), "why": why}
-    return Stream({**made, **marks}, at, counted_in)
+    return Stream({**made, "use": (why == "").astype(np.float64), "why": why}, at, counted_in)
 
 
 # -- which rows can be used, and what is said of a log
@@ -310,17 +233,17 @@ STILL = ("photos", "marks", "clicks")
 SENSORS = {"f_": 1000.0, "w_": 100.0, "field_": 1000.0}
 #: Parts with angles -> beyond them none is an angle, deg.
 TURNS = {"poses": 361.0, "gimbal": 720.0}
+#: What is said of a log whose last message is not whole.
+CUT_OFF = "it ends within a message: the file was cut off, or the power was"
 ONE_HEIGHT = "heights above ellipsoid and sea level are the same: they are taken as above sea level"
 _EARTH_M = 6371e3
 
 
-def judge_log(format_: str, found: Decoded, track: bool) -> RawLog:
+def judge_log(found: RawLog, track: bool) -> RawLog:
     """A log out of what its reader decoded.
 
     Parameters
     ----------
-    format_
-        As in `formats.FORMATS`.
     found
         What `decode` gave.
     track
@@ -331,12 +254,12 @@ def judge_log(format_: str, found: Decoded, track: bool) -> RawLog:
     RawLog
         With the parts that have rows. Columns without any value are left out, but for times and angles.
     """
-    parts = {name: one for name, one in found.parts.items() if len(next(iter(one.columns.values())))}
+    parts = {name: one for name, one in found.parts.items() if len(one)}
     notes = list(found.notes)
     for name, one in parts.items():
         columns = one.columns if name in STILL else _filled(name, one)
         notes += drop_rare_heights(columns) if track else []
-        parts[name] = one._replace(columns=columns)
+        parts[name] = replace(one, columns=columns)
     if "gnss" in parts and _one_height(parts["gnss"].columns):
         notes.append(ONE_HEIGHT)
         for name in ("poses", "gnss"):
@@ -348,11 +271,10 @@ def judge_log(format_: str, found: Decoded, track: bool) -> RawLog:
         )
         for name, one in parts.items()
     }
-    lost = tuple(f"{plural(count, what)} {rest}".rstrip() for count, what, rest in found.lost if count)
-    return RawLog(format_, streams, found.vehicle, found.clock, lost, tuple(dict.fromkeys(notes)))
+    return replace(found, parts=streams, lost=tuple(found.lost), notes=tuple(dict.fromkeys(notes)))
 
 
-def _filled(part: str, one: Readings) -> dict[str, Any]:
+def _filled(part: str, one: Stream) -> dict[str, Any]:
     """Columns with any value; images may be taken before the first fix, and then have no place."""
     columns = dict(one.columns)
     if one.anywhere and "latitude_deg" in columns:
@@ -408,7 +330,7 @@ def _misplaced(latitude: Array, longitude: Array) -> dict[str, Mask]:
         }
 
 
-def judge(part: str, decoded: Readings) -> dict[str, Mask]:
+def judge(part: str, decoded: Stream) -> dict[str, Mask]:
     """Why rows of a part cannot be used.
 
     Parameters
@@ -685,7 +607,7 @@ def fix_reasons(fix: Array) -> dict[str, Mask]:
     return {"no fix": fix < FIX_PLANE, "a fix without height": fix < FIX_SPACE}
 
 
-def usable(part: str, found: Readings) -> Mask:
+def usable(part: str, found: Stream) -> Mask:
     """(N,) rows of a part that can be used."""
     return ~any_of(judge(part, found).values(), len(found.columns["time_log_s"]))
 
@@ -716,7 +638,7 @@ def at_times(
     own = np.asarray(stamps, float)
     place = {name: one for name, one in values.items() if name.startswith(("lat", "lon", "height_"))}
     none = np.isnan(own) if doubtful is None else np.isnan(own) | doubtful
-    good = usable("", Readings({"time_log_s": own, **place}, unusable={"doubtful": none}))
+    good = usable("", Stream({"time_log_s": own, **place}, unusable={"doubtful": none}))
     found, finite = np.full((len(times), len(values)), np.nan), np.isfinite(times)
     if good.any():
         taken = {name: one[good] for name, one in values.items()}
@@ -731,7 +653,7 @@ def at_times(
     return made
 
 
-def heading_at(poses: Readings | None, times_s: Array, clock: str = "time_s") -> Array:
+def heading_at(poses: Stream | None, times_s: Array, clock: str = "time_s") -> Array:
     """Yaw of the vehicle at times (N,) of a clock of its poses, deg; NaN where they do not reach."""
     if poses is None or not (used := usable("poses", poses)).any():
         return np.full(len(times_s), np.nan)

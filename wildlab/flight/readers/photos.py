@@ -28,6 +28,7 @@ from PIL import ExifTags, Image
 from scipy.spatial.transform import Rotation
 
 from wildlab.errors import WildlabError
+from wildlab.flight.clock_fitting import wall_to_utc
 from wildlab.flight.files import regular_size, unreadable
 from wildlab.flight.readers.frames.image import (
     CAMERA,
@@ -47,16 +48,13 @@ from wildlab.flight.readers.log import (
     ANGLES,
     WORLD,
     Array,
-    Clock,
-    Decoded,
     RawLog,
-    Readings,
+    Stream,
     any_of,
     holding,
     named,
 )
-from wildlab.flight.readers.text import LATEST_S, plural, stamp_s
-from wildlab.flight.units import wall_to_utc
+from wildlab.flight.readers.text import LATEST_S, plural, stamp_s, told
 
 #: Bytes of XMP that are looked through.
 MOST_XMP = 1_000_000
@@ -445,8 +443,8 @@ def focal_px_of(tags: Tags, width: int, height: int) -> list[tuple[str, float]]:
             found.append((BY_SIZE, mm / pitches[0]))
     if 0 < tags.view_deg < 179:
         found.append((BY_VIEW, width / 2 / math.tan(math.radians(tags.view_deg) / 2)))
-    film = film_of(tags)
-    if film > 0:
+    film = number(tags.exif.get("FocalLengthIn35mmFilm"))
+    if 0 < film < 1e5:
         found.append((BY_FILM, film * math.hypot(width, height) / DIAGONAL_35MM))
     return [(what, px) for what, px in found if 1 < px < 1e7]
 
@@ -457,16 +455,6 @@ def dewarped_of(tags: Tags) -> float:
     both = [number(one) for one in given[:2]]
     usable = len(given) == 9 and all(0 < one < 1e6 for one in both) and abs(both[0] / both[1] - 1) < 0.05
     return math.sqrt(both[0] * both[1]) if usable else NAN
-
-
-def focal_mm_of(tags: Tags) -> float:
-    """Focal length, mm; NaN where it is not said."""
-    return _within(_mm(tags), 0, 1e5)
-
-
-def film_of(tags: Tags) -> float:
-    """Focal length of a camera for 35 mm film with the same view, mm; NaN where it is not said."""
-    return _within(number(tags.exif.get("FocalLengthIn35mmFilm")), 0, 1e5)
 
 
 def _mm(tags: Tags) -> float:
@@ -534,7 +522,7 @@ OFF_S = 2.0
 LOCAL, BY_GPS, BY_ZONE = "local time without a zone", "GPS time of the images", "zones that the images state"
 
 
-def folder_decode(folder: Path, zone: str | None) -> Decoded:
+def folder_decode(folder: Path, zone: str | None) -> RawLog:
     """The images of a folder and of all folders below it, as a card has them: ``100MEDIA``, ``101MEDIA``.
 
     Parameters
@@ -546,7 +534,7 @@ def folder_decode(folder: Path, zone: str | None) -> Decoded:
 
     Returns
     -------
-    Decoded
+    RawLog
         With the part ``photos``, by folders and in the order of names; files of folders below have names
         with ``/``. Angles of the airframe are ``roll_deg`` and so on, those of the optical axis
         ``roll_world_deg`` and so on. Sizes are those of the pixels that are read: of FLIR's raw image,
@@ -578,32 +566,31 @@ def folder_decode(folder: Path, zone: str | None) -> Decoded:
     columns |= {
         "fix": [fix_of(one) for one in tags],
         **{name: [size[i] or NAN for size in sizes] for i, (name, _) in enumerate(_SIDES)},
-        "focal_mm": [focal_mm_of(one) for one in tags],
-        "focal_35mm": [film_of(one) for one in tags],
         "focal_px": [px for _, px in focal],
         "focal_from": [how for how, _ in focal],
         "camera": cameras,
     }
     wall, time = np.full((2, len(tags)), NAN)
-    clocks, notes = [], []
+    clocks: Counter[str] = Counter()
+    notes: list[str] = []
     # Cameras beside each other have folders of their own.
     for place in dict.fromkeys(above):
         rows = np.flatnonzero(np.array(above) == place)
         wall[rows], time[rows], clock, said = _times([tags[row] for row in rows], zone)
-        clocks += [clock] if clock else []
+        clocks[clock] += len(rows)
         notes += said
     problems = Counter(one.problem for one in tags if one.problem)
     makers = {name for name in cameras if name}
-    part = Readings(
+    part = Stream(
         columns | {"time_log_s": wall, "time_s": time},
         unusable={reason: np.array(why) == reason for reason in dict.fromkeys(why) if reason},
         counted_in="image",
     )
-    return Decoded(
+    return RawLog(
         {"photos": part},
         vehicle=makers.pop() if len(makers) == 1 else "",
-        clock=max(clocks, key=lambda one: one.pairs, default=None),
-        lost=[*lost, *((count, "image", f": {what}") for what, count in problems.items())],
+        clock=max(clocks, key=clocks.__getitem__, default=""),
+        lost=told(*lost, *((count, "image", f": {what}") for what, count in problems.items())),
         notes=[*notes, *_notes(tags, cameras, stated, why)],
     )
 
@@ -632,7 +619,7 @@ def _files(folder: Path) -> tuple[list[Path], list[tuple[int, str, str]]]:
     return sorted(paths, key=key)[:MOST_IMAGES], left
 
 
-def _times(tags: list[Tags], zone: str | None) -> tuple[Array, Array, Clock | None, list[str]]:
+def _times(tags: list[Tags], zone: str | None) -> tuple[Array, Array, str, list[str]]:
     """The camera's clock as if it were UTC, and UTC, (N,) s since 1970; how the one became the other; notes.
 
     The camera's clock has the intervals, and satellites or a zone bring it to UTC: a stamp of GPS may be of
@@ -643,7 +630,7 @@ def _times(tags: list[Tags], zone: str | None) -> tuple[Array, Array, Clock | No
     both, stated = np.isfinite(sky - wall), np.isfinite(ahead)
     if not np.isfinite(wall).any():
         timed = bool(np.isfinite(sky).any())
-        return sky, sky, Clock(BY_GPS) if timed else None, [] if timed else ["no image carries a time"]
+        return sky, sky, BY_GPS if timed else "", [] if timed else ["no image carries a time"]
     apart = float(np.median((sky - wall)[both])) if both.any() else NAN
     zone_s = float(np.median(ahead[stated])) if stated.any() else NAN
     left = np.abs((sky - wall)[both] - apart)
@@ -651,22 +638,22 @@ def _times(tags: list[Tags], zone: str | None) -> tuple[Array, Array, Clock | No
     if stated.any() and (stated.all() or not both.any()):
         # Where one image does not state its zone, the others' is that of the same clock.
         time = wall - np.where(stated, ahead, zone_s)
-        clock = Clock(BY_ZONE, offset_s=-zone_s, pairs=int(stated.sum()))
+        clock = BY_ZONE
     elif both.any():
         time = np.where(np.isfinite(wall), wall + apart, sky) if spread <= ONE_CLOCK_S else sky
-        clock = Clock(BY_GPS, 1.0, apart, spread, float(left.max()), len(left))
+        clock = BY_GPS
     elif zone is not None:
         time = wall_to_utc(wall, zone)
-        clock = Clock(f"local time of the zone {zone}", offset_s=float(np.nanmedian(time - wall)))
+        clock = f"local time of the zone {zone}"
     else:
-        time, clock = np.full(len(wall), NAN), Clock(LOCAL)
+        time, clock = np.full(len(wall), NAN), LOCAL
     without = int(np.isnan(np.fmax(wall, sky)).sum())
     notes = {
         f"the camera's clock, which is used, is {-(apart + zone_s):+.0f} s from the GPS time in the images": (
-            clock.base == BY_ZONE and spread <= ONE_CLOCK_S and abs(apart + zone_s) > OFF_S
+            clock == BY_ZONE and spread <= ONE_CLOCK_S and abs(apart + zone_s) > OFF_S
         ),
-        "the camera's clock is not steady: GPS time is used": clock.base == BY_GPS and spread > ONE_CLOCK_S,
-        "the camera's clock is local time: state its zone": clock.base == LOCAL,
+        "the camera's clock is not steady: GPS time is used": clock == BY_GPS and spread > ONE_CLOCK_S,
+        "the camera's clock is local time: state its zone": clock == LOCAL,
         f"{plural(without, 'image')} without a time": without,
     }
     return wall, time, clock, holding(notes)
@@ -770,7 +757,7 @@ def camera_of(log: RawLog) -> dict[str, Any] | None:
         raise WildlabError(problem, "give each focal length a folder of its own", field="focal_px")
     how = Counter(str(each) for each in columns["focal_from"][known] if each).most_common(1)[0][0]
     if how == BY_FILM:
-        film = float(np.nanmedian(columns["focal_35mm"][known]))
+        film = middle * DIAGONAL_35MM / math.hypot(width, height)
         how += f" of {film:g} mm over the diagonal, rounded to within {50 / film:.0f} %"
     sizes = {"width_px": int(width), "height_px": int(height)}
     return {"camera": camera, **sizes, "focal_px": middle, "how": how}

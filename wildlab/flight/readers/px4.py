@@ -21,6 +21,7 @@ from wildlab.flight.clock_fitting import ClockFit, fit_steady
 from wildlab.flight.files import printable
 from wildlab.flight.readers.log import (
     ANGLES,
+    CUT_OFF,
     FIELD,
     FIX_SPACE,
     IMU,
@@ -28,10 +29,9 @@ from wildlab.flight.readers.log import (
     VELOCITY,
     WORLD,
     Array,
-    Clock,
-    Decoded,
     Messages,
-    Readings,
+    RawLog,
+    Stream,
     at_times,
     device_angles,
     euler_deg,
@@ -43,6 +43,8 @@ from wildlab.flight.readers.log import (
 )
 
 MAGIC = b"ULog\x01\x12\x35"
+#: Of each message before its content.
+HEAD_BYTES = 3
 #: Fields of all topics of a log together (real ones have some 5000), and bytes that are no messages.
 MOST_FIELDS, MOST_STRANGE = 50_000, 100_000
 
@@ -82,7 +84,7 @@ def sniff(head: bytes) -> bool:
     return head.startswith(MAGIC)
 
 
-def decode(path: Path, data: bytes, zone: str | None) -> Decoded:
+def decode(path: Path, data: bytes, zone: str | None) -> RawLog:
     """A ULog.
 
     Raises
@@ -93,7 +95,7 @@ def decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     """
     if not data.startswith(MAGIC):
         raise WildlabError("does not begin as a ULog does", "give the .ulg as it was logged", file=path)
-    ulog = _read(path, data)
+    ulog, cut = _read(path, data)
     topics: dict[str, Messages] = {}
     for one in sorted(ulog.data_list, key=lambda one: one.multi_id):
         if "timestamp" in one.data:
@@ -111,14 +113,27 @@ def decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     said = {
         f"the logger fell behind {len(ulog.dropouts)} times and lost {lost_s:.3f} s in all": ulog.dropouts,
         "damaged places are left out": ulog.file_corruption,
+        CUT_OFF: cut,
         "UTC is not known: times count from the start of the system": log.fit is None,
     }
-    clock = Clock("") if log.fit is None else Clock.fitted("UTC of the receiver", log.fit)
-    return Decoded(parts, _vehicle(ulog.msg_info_dict), clock, notes=notes + holding(said))
+    clock = "UTC of the receiver" if log.fit else ""
+    return RawLog(parts, _vehicle(ulog.msg_info_dict), clock, notes=notes + holding(said))
 
 
-def _read(path: Path, data: bytes) -> Any:
-    """What pyulog makes of it, of the topics that are wanted."""
+class Watched(io.BytesIO):
+    """Bytes that remember whether the last read got less than it asked for; where a head is asked for, none
+    at all is the end."""
+
+    cut = False
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        found = super().read(size)
+        self.cut = len(found) < (size or 0) and not (size == HEAD_BYTES and not found)
+        return found
+
+
+def _read(path: Path, data: bytes) -> tuple[Any, bool]:
+    """What pyulog makes of it, of the topics that are wanted, and whether it ends within a message."""
     from pyulog import ULog
     from pyulog.exceptions import ULogException
 
@@ -146,7 +161,8 @@ def _read(path: Path, data: bytes) -> Any:
 
     try:
         with contextlib.redirect_stdout(io.StringIO()):
-            return Bounded(io.BytesIO(data), TOPICS, disable_str_exceptions=True)
+            stream = Watched(data)
+            return Bounded(stream, TOPICS, disable_str_exceptions=True), stream.cut
     except (ULogException, ValueError, KeyError, IndexError, TypeError, struct.error) as error:
         problem = f"cannot be read ({printable(str(error))[:80]})"
         raise WildlabError(problem, "copy it again", file=path) from None
@@ -193,12 +209,12 @@ class Px4Log(NamedTuple):
         nothing = Messages(names[0], {}, np.zeros(0, np.int64))
         return next((self.topics[name] for name in names if name in self.topics), nothing)
 
-    def readings(self, found: Messages, columns: dict[str, Array], **more: object) -> Readings:
+    def readings(self, found: Messages, columns: dict[str, Array], **more: object) -> Stream:
         """Columns of a topic with ``time_s`` (UTC, NaN where that is not known) and ``time_log_s``."""
         taken = taken_s(found)
         utc = np.full(len(taken), np.nan) if self.fit is None else self.fit.to_reference(taken)
         times = {"time_s": utc, "time_log_s": taken}
-        return Readings(times | columns, found.rows, f"message of {found.name}", **more)  # type: ignore[arg-type]
+        return Stream(times | columns, found.rows, f"message of {found.name}", **more)  # type: ignore[arg-type]
 
 
 def taken_s(found: Messages) -> Array:
@@ -209,7 +225,7 @@ def taken_s(found: Messages) -> Array:
     return np.where(true, sample, stamp)
 
 
-def _parts(log: Px4Log) -> tuple[dict[str, Readings], list[str]]:
+def _parts(log: Px4Log) -> tuple[dict[str, Stream], list[str]]:
     """All parts that there are rows of, and sentences on what a user should know of them."""
     notes: list[str] = []
     poses = _poses(log, notes)
@@ -224,7 +240,7 @@ def _parts(log: Px4Log) -> tuple[dict[str, Readings], list[str]]:
     return {name: one for name, one in parts.items() if one is not None}, notes
 
 
-def _poses(log: Px4Log, notes: list[str]) -> Readings | None:
+def _poses(log: Px4Log, notes: list[str]) -> Stream | None:
     attitude = log.first("vehicle_attitude")
     place, local = log.first("vehicle_global_position"), log.first("vehicle_local_position")
     if not attitude.has("q[0]"):
@@ -291,7 +307,7 @@ def _local_motion(local: Messages) -> dict[str, Array]:
     }
 
 
-def _gnss(log: Px4Log) -> Readings:
+def _gnss(log: Px4Log) -> Stream:
     found = log.first("vehicle_gps_position", "sensor_gps")
     velocity = found.columns(named(VELOCITY, ("vel_n_m_s", "vel_e_m_s", "vel_d_m_s")))
     moving = found.get("vel_ned_valid") != 0
@@ -300,13 +316,13 @@ def _gnss(log: Px4Log) -> Readings:
     return log.readings(found, columns, unusable=fix_reasons(columns["fix"]))
 
 
-def _imu(log: Px4Log) -> Readings:
+def _imu(log: Px4Log) -> Stream:
     found = log.first("sensor_combined")
     names = [f"{name}[{i}]" for name in ("accelerometer_m_s2", "gyro_rad") for i in range(3)]
     return log.readings(found, found.columns(named(IMU, names)))
 
 
-def _magnetometer(log: Px4Log) -> Readings | None:
+def _magnetometer(log: Px4Log) -> Stream | None:
     for name in ("vehicle_magnetometer", "sensor_mag", "sensor_combined"):
         found = log.first(name)
         fields = "xyz" if name == "sensor_mag" else [f"magnetometer_ga[{i}]" for i in range(3)]
@@ -316,13 +332,13 @@ def _magnetometer(log: Px4Log) -> Readings | None:
     return None
 
 
-def _triggers(log: Px4Log) -> Readings:
+def _triggers(log: Px4Log) -> Stream:
     found = log.first("camera_capture", "camera_trigger")
     fields = LAT_LON | {"height_sea_m": "alt"} if found.has("lat") else {}
     return log.readings(found, found.columns({"number": "seq", **fields}), anywhere=True)
 
 
-def _gimbal(log: Px4Log, poses: Readings | None) -> Readings | None:
+def _gimbal(log: Px4Log, poses: Stream | None) -> Stream | None:
     device, mount = log.first("gimbal_device_attitude_status"), log.first("mount_orientation")
     if device.has("q[0]"):
         heading = heading_at(poses, taken_s(device), "time_log_s")

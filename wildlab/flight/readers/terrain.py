@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.files import sha256
-from wildlab.flight.files import printable, regular_size
+from wildlab.flight.files import gdal, printable, regular_size
 from wildlab.flight.manifest import UNITS, TerrainSays
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ class ElevationMap:
     @contextlib.contextmanager
     def opened(self) -> Iterator[Any]:
         """The file, for `read`."""
-        with _gdal(), _dataset(self.path) as data:
+        with gdal(), _dataset(self.path) as data:
             yield data
 
     def read(self, data: Any, row: int, column: int, rows: int, columns: int) -> Heights:
@@ -210,7 +210,7 @@ def open_elevation(path: Path, says: TerrainSays) -> ElevationMap:
         regular_size(path)
     except FileNotFoundError:
         raise WildlabError("there is no such file", "check the path of the map", file=path) from None
-    with _gdal(), _dataset(path) as data:
+    with gdal(), _dataset(path) as data:
         picture = data.driver == "PNG"
         _refuse_layout(data, path)
         stated = says.crs if says.crs is not None else (data.crs.to_wkt() if data.crs else None)
@@ -256,32 +256,21 @@ def open_elevation(path: Path, says: TerrainSays) -> ElevationMap:
 
 
 @contextlib.contextmanager
-def _gdal() -> Iterator[None]:
-    """GDAL with a small cache, and without a look at neighbouring files or the network."""
-    import rasterio
-
-    with rasterio.Env(GDAL_CACHEMAX=64, GDAL_DISABLE_READDIR_ON_OPEN="EMPTY_DIR"):
-        yield
-
-
-@contextlib.contextmanager
 def _dataset(path: Path) -> Iterator[Any]:
     import rasterio
-    from rasterio.errors import NotGeoreferencedWarning, RasterioError
+    from rasterio.errors import RasterioError
 
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", NotGeoreferencedWarning)
-        try:
-            # No other drivers: some of them follow what a file says to other files and to the network.
-            data = rasterio.open(path, driver=_driver(path))
-        except (RasterioError, ValueError) as error:
-            raise WildlabError(
-                f"cannot be read as GeoTIFF or PNG ({_first_line(error)})",
-                "give the elevation map, whole, as GeoTIFF",
-                file=path,
-            ) from None
-        with data:
-            yield data
+    try:
+        # No other drivers: some of them follow what a file says to other files and to the network.
+        data = rasterio.open(path, driver=_driver(path))
+    except (RasterioError, ValueError) as error:
+        raise WildlabError(
+            f"cannot be read as GeoTIFF or PNG ({_first_line(error)})",
+            "give the elevation map, whole, as GeoTIFF",
+            file=path,
+        ) from None
+    with data:
+        yield data
 
 
 def _driver(path: Path) -> str:

@@ -108,6 +108,15 @@ def plural(count: int, singular: str) -> str:
     return f"{count:,} {word if count == 1 else several}{of}{rest}"
 
 
+#: How much of what could not be read: a number, what it counts, and the rest of the sentence.
+Loss = tuple[int, str, str]
+
+
+def told(*lost: Loss) -> tuple[str, ...]:
+    """Sentences on what could not be read; of none nothing is said."""
+    return tuple(f"{plural(count, what)} {rest}".rstrip() for count, what, rest in lost if count)
+
+
 class TextTable(NamedTuple):
     """A table, read.
 
@@ -135,12 +144,12 @@ class TextTable(NamedTuple):
         """(N,) values of a column, NaN where one is no number."""
         return np.array([number(row[column], self.comma) for row in self.rows], float)
 
-    def lost(self) -> list[tuple[int, str, str]]:
+    def lost(self) -> Loss:
         """What is lost of it: lines that are no rows."""
         first = (
             f"without {len(self.header)} values, the first is line {self.short[0][0]}" if self.short else ""
         )
-        return [(len(self.short), "line", first)]
+        return len(self.short), "line", first
 
 
 def plain(name: str) -> str:

@@ -13,6 +13,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -29,11 +30,10 @@ from wildlab.flight.readers.log import (
     VELOCITY,
     WORLD,
     Array,
-    Clock,
-    Decoded,
     Mask,
     Messages,
-    Readings,
+    RawLog,
+    Stream,
     any_of,
     at_times,
     device_angles,
@@ -44,6 +44,7 @@ from wildlab.flight.readers.log import (
     named,
     wrapped,
 )
+from wildlab.flight.readers.text import told
 
 #: MAV_AUTOPILOT_INVALID and MAV_TYPE_GCS: what is no autopilot says so in its heartbeat.
 _NO_AUTOPILOT, _GROUND_STATION = 8, 6
@@ -78,13 +79,13 @@ class Telemetry(NamedTuple):
     """Sound frames of a log.
 
     `kinds`: messages of `KINDS` by name. `systems`: everybody who sent anything. `sound`: how many frames.
-    `lost`: as `Decoded` has it.
+    `lost`: as `RawLog` has it.
     """
 
     kinds: dict[str, Messages]
     systems: set[int]
     sound: int
-    lost: list[tuple[int, str, str]]
+    lost: tuple[str, ...]
 
     def of(self, name: str, system: int | None = None, component: int | None = None) -> Messages:
         """Messages of one kind, from whom; None: from all."""
@@ -156,7 +157,7 @@ def walk(data: bytes) -> Telemetry:
         (skipped, "byte", f"of {len(data)} in {places} places are no frames"),
         (len(data) - covered, "byte", f"of {len(data)} at the end: it ends within a frame"),
     ]
-    return Telemetry(kinds, systems, number - bad, lost)
+    return Telemetry(kinds, systems, number - bad, told(*lost))
 
 
 def _messages(name: str, fields: list[str], rows: list[tuple[Any, ...]]) -> Messages:
@@ -200,14 +201,14 @@ class Boot(NamedTuple):
     """Runs of a vehicle from one start to the next, each with its clock.
 
     `first` (S,): number of the frame that each begins with. `rate`, `offset_s` (S,): to UTC. `behind_s` (S,):
-    middle of what receipts are behind UTC. `clock`: of the longest run. `notes`: sentences.
+    middle of what receipts are behind UTC. `clock`: as of the longest run. `notes`: sentences.
     """
 
     first: Array
     rate: Array
     offset_s: Array
     behind_s: Array
-    clock: Clock
+    clock: str
     notes: list[str]
 
     def utc(self, boot_s: Array, found: Messages) -> tuple[Array, Mask]:
@@ -262,8 +263,7 @@ def find_boot(frames: Telemetry, system: int, component: int) -> Boot | None:
         f"the vehicle was switched on {len(starts)} times; each run has a clock of its own": len(starts) > 1,
         "the vehicle's stamps are of several clocks": falls >= MOST_RUNS,
     }
-    clock = Clock.fitted(base, fits[main])
-    return Boot(number[starts], rate, offset_s, behind, clock, holding(notes))
+    return Boot(number[starts], rate, offset_s, behind, base, holding(notes))
 
 
 class Vehicle(NamedTuple):
@@ -284,7 +284,7 @@ class Vehicle(NamedTuple):
 
     def readings(
         self, found: Messages, field: str, columns: dict[str, Array], unusable: dict[str, Mask] | None = None
-    ) -> Readings:
+    ) -> Stream:
         """Columns of messages with ``time_s`` and ``time_log_s``.
 
         `field` is ``"time_boot_ms"``, ``"time_usec"``, or ``""`` where messages have no stamp. Without one
@@ -303,7 +303,7 @@ class Vehicle(NamedTuple):
                 if _most(beside) or own:
                     times = {"time_s": utc, "time_log_s": stamp}
                     wrong["a stamp that its receipt contradicts"] = ~beside
-        return Readings(times | columns, found.rows, "frame", wrong)
+        return Stream(times | columns, found.rows, "frame", wrong)
 
 
 def _most(rows: Mask) -> bool:
@@ -316,7 +316,7 @@ def sniff(head: bytes) -> bool:
     return any(_plausible(head, one.start()) for one in _BEGINNING.finditer(head)) and walk(head).sound > 0
 
 
-def decode(path: Path, data: bytes, zone: str | None) -> Decoded:
+def decode(path: Path, data: bytes, zone: str | None) -> RawLog:
     """A telemetry log, its rows counted in frames.
 
     Raises
@@ -347,8 +347,8 @@ def decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     if stations:
         said = ", ".join(map(str, sorted(stations)))
         notes = [*notes, f"left out as no vehicles: system {said}"]
-    clock, before = (vehicle.boot.clock, vehicle.boot.notes) if vehicle.boot else (None, [])
-    return Decoded(parts, _called(vehicle), clock, frames.lost, [*before, *notes])
+    clock, before = (vehicle.boot.clock, vehicle.boot.notes) if vehicle.boot else ("", [])
+    return RawLog(parts, _called(vehicle), clock, frames.lost, [*before, *notes])
 
 
 def _systems(frames: Telemetry) -> tuple[list[tuple[int, int]], set[int]]:
@@ -391,7 +391,7 @@ def _called(vehicle: Vehicle) -> str:
 # -- parts
 
 
-def _parts(vehicle: Vehicle) -> tuple[dict[str, Readings], list[str]]:
+def _parts(vehicle: Vehicle) -> tuple[dict[str, Stream], list[str]]:
     """All parts that there are rows of, and sentences on what a user should know of them."""
     notes: list[str] = []
     parts = {"poses": _poses(vehicle, notes), "gnss": _gnss(vehicle), **_inertial(vehicle, notes)}
@@ -399,7 +399,7 @@ def _parts(vehicle: Vehicle) -> tuple[dict[str, Readings], list[str]]:
     return {name: one for name, one in parts.items() if one is not None}, notes
 
 
-def _poses(vehicle: Vehicle, notes: list[str]) -> Readings | None:
+def _poses(vehicle: Vehicle, notes: list[str]) -> Stream | None:
     attitude, position = vehicle.own("ATTITUDE"), vehicle.own("GLOBAL_POSITION_INT")
     if not len(attitude):
         if len(position):
@@ -414,10 +414,10 @@ def _poses(vehicle: Vehicle, notes: list[str]) -> Readings | None:
     doubtful = any_of(where.unusable.values(), len(position))
     stamps, at = where.columns["time_s"], made.columns["time_s"]
     found = at_times(stamps, place, at, "GLOBAL_POSITION_INT", doubtful)
-    return made._replace(columns=made.columns | found)
+    return replace(made, columns=made.columns | found)
 
 
-def _gnss(vehicle: Vehicle) -> Readings:
+def _gnss(vehicle: Vehicle) -> Stream:
     found = vehicle.own("GPS_RAW_INT")
 
     def known(none: int, divisor: float, **names: str) -> dict[str, Array]:
@@ -441,7 +441,7 @@ def _gnss(vehicle: Vehicle) -> Readings:
     return vehicle.readings(found, "time_usec", columns, fix_reasons(columns["fix"]))
 
 
-def _inertial(vehicle: Vehicle, notes: list[str]) -> dict[str, Readings | None]:
+def _inertial(vehicle: Vehicle, notes: list[str]) -> dict[str, Stream | None]:
     """Of the first device, from the message in the best known units."""
     for name in ("HIGHRES_IMU", "SCALED_IMU", "RAW_IMU"):
         found = vehicle.own(name)
@@ -456,7 +456,7 @@ def _inertial(vehicle: Vehicle, notes: list[str]) -> dict[str, Readings | None]:
         )
         stamp = "time_usec" if found.has("time_usec") else "time_boot_ms"
         felt = float(np.median(np.linalg.norm(force, axis=0))) / STANDARD_GRAVITY
-        parts: dict[str, Readings | None] = {}
+        parts: dict[str, Stream | None] = {}
         if _FELT[0] < felt < _FELT[1]:
             parts["imu"] = vehicle.readings(found, stamp, named(IMU, (*force, *rate)))
         else:
@@ -467,20 +467,20 @@ def _inertial(vehicle: Vehicle, notes: list[str]) -> dict[str, Readings | None]:
     return {}
 
 
-def _triggers(vehicle: Vehicle, notes: list[str]) -> Readings | None:
+def _triggers(vehicle: Vehicle, notes: list[str]) -> Stream | None:
     found, trigger = vehicle.any("CAMERA_FEEDBACK"), vehicle.any("CAMERA_TRIGGER")
     if not len(found):
         made = vehicle.readings(trigger, "time_usec", {"number": trigger.get("seq")})
         return made if len(trigger) else None
     fields = {"number": "img_idx", "height_sea_m": "alt_msl", "height_home_m": "alt_rel"}
     columns = found.columns(fields | {name: name[:-4] for name in ANGLES}) | found.columns(LAT_LON, 1e7)
-    made = vehicle.readings(found, "time_usec", columns)._replace(anywhere=True)
+    made = replace(vehicle.readings(found, "time_usec", columns), anywhere=True)
     if np.isnan(made.columns["time_log_s"]).all():
         notes.append("times of the triggers are those of receipt")
     return made
 
 
-def _gimbal(vehicle: Vehicle, poses: Readings | None, notes: list[str]) -> Readings | None:
+def _gimbal(vehicle: Vehicle, poses: Stream | None, notes: list[str]) -> Stream | None:
     kinds = ("GIMBAL_DEVICE_ATTITUDE_STATUS", "MOUNT_ORIENTATION")
     found = next((one for name in kinds if len(one := vehicle.any(name))), None)
     if found is None:
@@ -496,4 +496,4 @@ def _gimbal(vehicle: Vehicle, poses: Readings | None, notes: list[str]) -> Readi
         # Where the extension is not sent, its yaw is against the vehicle.
         yaw = yaw if (yaw != 0).any() else wrapped(found.get("yaw") + heading)
         angles = named(WORLD, (found.get("roll"), found.get("pitch"), yaw))
-    return made._replace(columns=made.columns | angles)
+    return replace(made, columns=made.columns | angles)

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 from functools import reduce
 from operator import xor
@@ -31,22 +32,20 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.clock_fitting import fit_clock
+from wildlab.flight.clock_fitting import GPS_START_S, WEEK_S, gps_to_utc, week_to_utc
 from wildlab.flight.readers import text
 from wildlab.flight.readers.log import (
+    UTC_OF_LOG,
     VELOCITY,
     Array,
-    Clock,
-    Decoded,
     Mask,
-    Readings,
-    any_of,
+    RawLog,
+    Stream,
     holding,
     level_velocity,
     named,
 )
-from wildlab.flight.readers.text import number, numbers, parse_xml, plural, stamp_s
-from wildlab.flight.units import GPS_START_S, WEEK_S, gps_to_utc, week_to_utc
+from wildlab.flight.readers.text import number, numbers, parse_xml, plural, stamp_s, told
 from wildlab.geometry.attitude_uncertainty import tilt_from_roll_pitch
 
 # -- NMEA 0183
@@ -116,7 +115,7 @@ def nmea_sniff(head: bytes) -> bool:
     return bool(len(found.table)) or len(found.kinds) >= 3
 
 
-def nmea_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
+def nmea_decode(path: Path, data: bytes, zone: str | None) -> RawLog:
     """A log of sentences; rows are lines of the file.
 
     Raises
@@ -144,10 +143,10 @@ def nmea_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
         "no sentence carries a date (RMC, ZDA): UTC is not known": not timed,
     }
     columns = {"time_s": utc, "time_log_s": place["time"].to_numpy(float), **_columns(found)}
-    return Decoded(
-        {"gnss": Readings(columns, place["line"], "line", {"no fix": found["no_fix"]})},
-        clock=Clock("UTC of the log", pairs=timed) if timed else None,
-        lost=[(bad, "sentence", "with a wrong or missing checksum")],
+    return RawLog(
+        {"gnss": Stream(columns, place["line"], "line", {"no fix": found["no_fix"]})},
+        clock=UTC_OF_LOG if timed else "",
+        lost=told((bad, "sentence", "with a wrong or missing checksum")),
         notes=holding(notes),
     )
 
@@ -363,7 +362,7 @@ def ubx_sniff(head: bytes) -> bool:
     return len(frames(head).start) > 0
 
 
-def ubx_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
+def ubx_decode(path: Path, data: bytes, zone: str | None) -> RawLog:
     """A log of a u-blox receiver; text between the messages does no harm. Rows are messages of UBX.
 
     Raises
@@ -378,12 +377,10 @@ def ubx_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     poses = _poses(found, gnss)
     begins, ends = np.r_[found.start, len(data)].tolist(), np.r_[0, found.stop].tolist()
     rest = b"".join(data[i:j] for i, j in zip(ends, begins, strict=True))
-    own, time = gnss.columns["time_log_s"], gnss.columns["time_s"]
-    known = np.isfinite(own * time) & ~any_of(gnss.unusable.values(), len(own))
-    return Decoded(
+    return RawLog(
         {"gnss": gnss} | ({"poses": poses} if poses else {}),
-        clock=Clock.fitted("UTC of the log", fit_clock(own[known], time[known])) if known.any() else None,
-        lost=[(len(rest.translate(None, _TEXT)), "byte", "of no message of UBX and of no text")],
+        clock=UTC_OF_LOG,
+        lost=told((len(rest.translate(None, _TEXT)), "byte", "of no message of UBX and of no text")),
     )
 
 
@@ -410,7 +407,7 @@ def _place(found: UbxFrames, rows: pd.DataFrame) -> dict[str, Array]:
     return columns | {"undulation_m": columns["height_ellipsoid_m"] - columns["height_sea_m"]}
 
 
-def _of_pvt(found: UbxFrames, kind: tuple[int, int]) -> Readings | None:
+def _of_pvt(found: UbxFrames, kind: tuple[int, int]) -> Stream | None:
     """`gnss` of NAV-PVT, or of HNR-PVT, which has course and speed instead of a velocity."""
     rows = found.rows(kind)
     if not len(rows):
@@ -432,10 +429,10 @@ def _of_pvt(found: UbxFrames, kind: tuple[int, int]) -> Readings | None:
         reasons["no position"] = (one["flags3"] & 1) > 0
     else:
         columns |= level_velocity(one["speed"] * 1e-3, one["course"] * 1e-5)
-    return Readings(columns, one["which"], "message", reasons)
+    return Stream(columns, one["which"], "message", reasons)
 
 
-def _of_old(found: UbxFrames) -> Readings | None:
+def _of_old(found: UbxFrames) -> Stream | None:
     rows = found.rows(POSLLH)
     if not len(rows):
         return None
@@ -451,7 +448,7 @@ def _of_old(found: UbxFrames) -> Readings | None:
         "fix": kinds,
         "satellites": status["satellites"].to_numpy(float),
     }
-    return Readings(columns, rows["which"], "message", {"no fix": (flags & 1 == 0).to_numpy()})
+    return Stream(columns, rows["which"], "message", {"no fix": (flags & 1 == 0).to_numpy()})
 
 
 def _weeks_to_utc(found: UbxFrames, own: Array) -> Array:
@@ -466,7 +463,7 @@ def _weeks_to_utc(found: UbxFrames, own: Array) -> Array:
     return own + next((float(np.nanmedian(one)) for one in apart if np.isfinite(one).any()), np.nan)
 
 
-def _poses(found: UbxFrames, gnss: Readings) -> Readings | None:
+def _poses(found: UbxFrames, gnss: Stream) -> Stream | None:
     """Attitude of HNR-ATT at the positions of HNR-PVT, or of NAV-ATT at those of `gnss`."""
     place, kind = _of_pvt(found, HNR_PVT), HNR_ATT
     if place is None:
@@ -487,7 +484,7 @@ def _poses(found: UbxFrames, gnss: Readings) -> Readings | None:
     columns |= {"sd_tilt_deg": tilt_from_roll_pitch(*spreads[:2]), "sd_heading_deg": spreads[2]}
     fix = place.columns["fix"]
     kinds = {"no fix": place.unusable["no fix"] | (fix == 0), "estimated, not measured": fix == 1}
-    return place._replace(columns=columns, unusable={**place.unusable, **kinds})
+    return replace(place, columns=columns, unusable={**place.unusable, **kinds})
 
 
 # -- GPX
@@ -511,7 +508,7 @@ def gpx_sniff(head: bytes) -> bool:
     return re.search(r"<(?:\w+:)?gpx[\s>]", text.decode(head[:-1] if len(head) % 2 else head)) is not None
 
 
-def gpx_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
+def gpx_decode(path: Path, data: bytes, zone: str | None) -> RawLog:
     """The tracks of a GPX file, in order of time; rows are points as counted in the file.
 
     Raises
@@ -533,20 +530,20 @@ def gpx_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
     timed = int((columns["time_s"] >= GPS_START_S).sum())
     notes = ["no point carries a time that can be true"]
     return _in_order_of_time(
-        Decoded(
-            {"gnss": Readings(columns, None, "point")},
-            clock=Clock("UTC of the log", pairs=timed) if timed else None,
-            lost=[(broken, "point", f"of {len(pieces)} could not be read")],
+        RawLog(
+            {"gnss": Stream(columns, None, "point")},
+            clock=UTC_OF_LOG if timed else "",
+            lost=told((broken, "point", f"of {len(pieces)} could not be read")),
             notes=[] if timed else notes,
         )
     )
 
 
-def _in_order_of_time(found: Decoded) -> Decoded:
+def _in_order_of_time(found: RawLog) -> RawLog:
     """Some programs write the newest track first."""
     part = found.parts["gnss"]
     time = part.columns["time_s"]
-    if found.clock is None or not (np.diff(time) < 0).any():
+    if not found.clock or not (np.diff(time) < 0).any():
         return found
     order = np.argsort(time, kind="stable")
     rows = (1 + np.arange(len(time)) if part.rows is None else np.asarray(part.rows))[order]
@@ -554,8 +551,8 @@ def _in_order_of_time(found: Decoded) -> Decoded:
         {name: one[order] for name, one in given.items()} for given in (part.columns, part.unusable)
     )
     notes = [*found.notes, "rows were put in order of time"]
-    part = part._replace(columns=columns, rows=rows, unusable=reasons)
-    return Decoded({"gnss": part}, clock=found.clock, lost=found.lost, notes=notes)
+    part = replace(part, columns=columns, rows=rows, unusable=reasons)
+    return replace(found, parts={"gnss": part}, notes=notes)
 
 
 def _points(points: list[str]) -> list[Element]:
@@ -609,7 +606,7 @@ def pos_sniff(head: bytes) -> bool:
     return any(one.startswith("%") and re.search(f"{_NAMED.pattern}|program   : RTK", one) for one in lines)
 
 
-def pos_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
+def pos_decode(path: Path, data: bytes, zone: str | None) -> RawLog:
     """Positions as RTKLIB wrote them, in order of time; rows are lines of the file.
 
     Raises
@@ -657,12 +654,11 @@ def pos_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
         "v_down_m_s": -of("vu"),
         "fix": fix,
     }
-    base = "GPS time of the rows" if scale == "GPST" else "UTC of the log"
     return _in_order_of_time(
-        Decoded(
-            {"gnss": Readings(columns, [at for at, _, _ in rows], "line")},
-            clock=Clock.shifted(base, own, columns["time_s"]),
-            lost=[(bad, "line", f"of {bad + len(rows)} could not be read")],
+        RawLog(
+            {"gnss": Stream(columns, [at for at, _, _ in rows], "line")},
+            clock="GPS time of the rows" if scale == "GPST" else UTC_OF_LOG,
+            lost=told((bad, "line", f"of {bad + len(rows)} could not be read")),
         )
     )
 

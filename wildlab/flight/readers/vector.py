@@ -22,8 +22,9 @@ from pydantic import BaseModel, Field
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import check_model, printable, read_regular
-from wildlab.flight.readers.log import Decoded, Readings, holding
+from wildlab.flight.readers.log import RawLog, Stream, holding
 from wildlab.flight.readers.text import (
+    Loss,
     Real,
     Several,
     header_of,
@@ -31,6 +32,7 @@ from wildlab.flight.readers.text import (
     parse_xml,
     plain,
     read_text_table,
+    told,
 )
 from wildlab.geometry.frames import (
     Array,
@@ -527,9 +529,9 @@ def _decoded(
     columns: dict[str, Any],
     rows: Sequence[int],
     counted_in: str,
-    lost: Sequence[tuple[int, str, str]],
+    lost: Loss,
     notes: Sequence[str],
-) -> Decoded:
+) -> RawLog:
     """A log of nothing but marks: what has no place, no height or a name twice says so."""
     latitude, longitude = (np.asarray(columns[f"{one}_deg"], float) for one in ("latitude", "longitude"))
     heights = [np.asarray(columns[one], float) for one in columns if one.startswith("height_")]
@@ -544,8 +546,8 @@ def _decoded(
             "a name that stands there twice": pd.Series(names, dtype=object).duplicated().to_numpy(),
             "no height": ~np.isfinite(heights).any(axis=0),
         }
-    part = Readings({**columns, "name": names}, rows, counted_in, unusable)
-    return Decoded({"marks": part}, lost=lost, notes=notes)
+    part = Stream({**columns, "name": names}, rows, counted_in, unusable)
+    return RawLog({"marks": part}, lost=told(lost), notes=notes)
 
 
 def kml_sniff(head: bytes) -> bool:
@@ -561,17 +563,17 @@ def geojson_sniff(head: bytes) -> bool:
     return start == b"{" and any(one in bare for one in kinds)
 
 
-def kml_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
+def kml_decode(path: Path, data: bytes, zone: str | None) -> RawLog:
     """Points of placemarks; errors as of `read_places`, and where there is no point."""
     return _marks(path, data, "height_sea_m")
 
 
-def geojson_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
+def geojson_decode(path: Path, data: bytes, zone: str | None) -> RawLog:
     """Points of features; errors as of `kml_decode`."""
     return _marks(path, data, "height_ellipsoid_m")
 
 
-def _marks(path: Path, data: bytes, height: str) -> Decoded:
+def _marks(path: Path, data: bytes, height: str) -> RawLog:
     found, others = read_places(data, path)
     points = [one for one in found if one.is_point]
     others += len(found) - len(points)
@@ -587,7 +589,7 @@ def _marks(path: Path, data: bytes, height: str) -> Decoded:
             height == "height_sea_m" and not known.all()
         ),
     }
-    lost = [(others, "geometry", "besides: only points are marks")]
+    lost = (others, "geometry", "besides: only points are marks")
     return _decoded(columns | {height: high}, [one.row for one in points], "feature", lost, holding(notes))
 
 
@@ -621,7 +623,7 @@ def table_sniff(head: bytes) -> bool:
     return (places or projected) and not any(TIMES & set(one.split("_")) for one in names)
 
 
-def table_decode(path: Path, data: bytes, zone: str | None) -> Decoded:
+def table_decode(path: Path, data: bytes, zone: str | None) -> RawLog:
     """Rows of a table as marks: names, latitudes and longitudes in degrees, and heights.
 
     Raises

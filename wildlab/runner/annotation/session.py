@@ -20,7 +20,7 @@ from wildlab.errors import WildlabError
 from wildlab.files import csv_text, write_atomic
 from wildlab.flight.files import printable, read_regular, unreadable
 from wildlab.flight.manifest import FILE_NAME
-from wildlab.flight.readers.formats import read_log
+from wildlab.flight.readers import read_log
 from wildlab.flight.readers.frames.image import SUFFIXES, file_name, images_below
 from wildlab.flight.readers.photos import is_photos, natural_key
 from wildlab.flight.schema import TABLES, conform

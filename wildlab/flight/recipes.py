@@ -13,6 +13,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 from pydantic import AfterValidator, AwareDatetime, Field, field_validator, model_validator
 
 from wildlab.errors import WildlabError
+from wildlab.flight.clock_fitting import find_zone
 from wildlab.flight.files import Below, SafeName, Strict, check_model, did_you_mean, read_toml
 from wildlab.flight.manifest import (
     CameraPart,
@@ -30,10 +31,10 @@ from wildlab.flight.manifest import (
     TerrainSays,
     UncertaintyPart,
 )
+from wildlab.flight.readers import FOLDERS, FORMATS
 from wildlab.flight.readers.autoferry import Part
-from wildlab.flight.readers.formats import FOLDERS, FORMATS
 from wildlab.flight.readers.log import PARTS
-from wildlab.flight.units import Dimension, factor, find_zone
+from wildlab.flight.schema import Dimension, factor
 from wildlab.names import listed
 
 

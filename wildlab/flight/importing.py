@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel
 
 from wildlab.errors import WildlabError
-from wildlab.flight.calibration_files import parse_camera, read_learnt, refuse_other_camera
+from wildlab.flight.calibration_files import read_camera, read_learnt, refuse_other_camera
 from wildlab.flight.checks.check import find
 from wildlab.flight.clocks import between, poses_at
 from wildlab.flight.files import TOML_LIMIT, check_model, inside
@@ -30,9 +30,8 @@ from wildlab.flight.manifest import (
     TerrainSays,
     make_manifest,
 )
-from wildlab.flight.recipe.model import Recipe, read_recipe
-from wildlab.flight.recipe.raw import RawFiles, nanoseconds, plain_numbers
-from wildlab.flight.recipe.tables import (
+from wildlab.flight.raw_files import RawFiles, nanoseconds, plain_numbers
+from wildlab.flight.recipe_tables import (
     LocalFrame,
     Rows,
     frames_of_rows,
@@ -42,6 +41,7 @@ from wildlab.flight.recipe.tables import (
     read_sensors,
     read_truth,
 )
+from wildlab.flight.recipes import Recipe, read_recipe
 from wildlab.flight.store import Flight, save_flight
 from wildlab.flight.terrain import lay_terrain
 
@@ -106,7 +106,7 @@ def import_flight(
     recipe = read_recipe(recipe_path)
     folder = recipe_path.parent if source is None else Path(source)
     if not folder.is_dir():
-        raise WildlabError("there is no such folder", "check it", file=folder)
+        raise WildlabError("there is no such folder", "name that of the tables with --source", file=folder)
     learnt = None if calibration is None else read_learnt(calibration)
     flight = _build(recipe, RawFiles(folder, recipe_path, recipe.tables, recipe.logs))
     _refuse_problems(flight, recipe, folder)
@@ -197,8 +197,8 @@ def _camera(recipe: Recipe, raw: RawFiles) -> CameraPart | None:
         own file is missing or wrong.
     """
     if recipe.camera_file is not None:
-        text = raw.read(recipe.camera_file, "camera", TOML_LIMIT).decode("utf-8", errors="replace")
-        return parse_camera(text, raw.folder / recipe.camera_file).camera
+        raw.read(recipe.camera_file, "camera", TOML_LIMIT)
+        return read_camera(raw.folder / recipe.camera_file).camera
     block = recipe.camera
     if block is None:
         return None

@@ -1,4 +1,5 @@
-"""What lies on a card, files known by their content and folders of images, and the role of each in a flight.
+"""What lies on a card, files known by their content and folders of images, the role of each in a flight, and
+which camera took the images and how their stamps meet the vehicle's log.
 
 Whoever imports it may say otherwise; nothing is written.
 """
@@ -8,23 +9,27 @@ from __future__ import annotations
 import math
 import os
 import re
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
+from wildlab.flight.clock_fitting import Span
 from wildlab.flight.files import did_you_mean, printable, read_regular
-from wildlab.flight.readers.formats import FOLDERS, FORMATS, HEAD, read_folder, read_log, recognise
+from wildlab.flight.manifest import CameraPart
+from wildlab.flight.raw_files import RAW_LIMIT, match_images
+from wildlab.flight.readers import FOLDERS, FORMATS, HEAD, read_folder, read_log, recognise
 from wildlab.flight.readers.frames.image import SUFFIXES
 from wildlab.flight.readers.log import RawLog, Stream
-from wildlab.flight.recipe.raw import RAW_LIMIT
-from wildlab.flight.units import Span
+from wildlab.flight.readers.photos import camera_of, of_camera
+from wildlab.flight.readers.text import header_of
 from wildlab.geometry.frames import geodetic_to_ned
 from wildlab.names import listed
 
@@ -60,6 +65,11 @@ class CardItem:
     format: str = ""
     log: RawLog | None = None
     problem: str = ""
+
+    @property
+    def key(self) -> str:
+        """What tells it from others: a folder may hold images, and pixels of things in them."""
+        return self.name + self.format
 
     @property
     def shown(self) -> str:
@@ -205,16 +215,16 @@ def _read(path: Path, name: str, folder: str, zone: str | None) -> CardItem:
             return CardItem(name, format_, read_folder(path, format_, zone)[0])
         return CardItem(name, format_, read_log(path, read_regular(path, RAW_LIMIT), format_, zone))
     except WildlabError as error:
-        return CardItem(name, format_, problem=_why(error))
+        return CardItem(
+            name, format_, problem=f"{error.problem}; {error.fix}" if error.fix else error.problem
+        )
 
 
 def _unknown(head: bytes) -> str:
+    if len(header_of(head)) > 1:
+        recipe = "a recipe says what its columns are (data/recipes/README.md, which `wildlab doctor` finds)"
+        return f"a plain table: {recipe}; then wildlab import recipe.toml --source FOLDER"
     return "is empty" if not head else "no reader knows this format"
-
-
-def _why(error: WildlabError) -> str:
-    """Why a file could not be read, and what to do."""
-    return f"{error.problem}; {error.fix}" if error.fix else error.problem
 
 
 # -- roles
@@ -265,7 +275,7 @@ def choose_roles(found: Sequence[CardItem], stated: Mapping[str, str]) -> list[C
     Parameters
     ----------
     found
-        From `found.search`.
+        From `search`.
     stated
         Name of a file or folder -> role, as `ROLES` names them; ``target:NAME`` names the target too. These
         are not argued with.
@@ -281,20 +291,20 @@ def choose_roles(found: Sequence[CardItem], stated: Mapping[str, str]) -> list[C
         Where a role or a name that is stated is not known, or two are stated to be the vehicle's own log.
     """
     given = _stated(found, stated)
-    choices = {one.name + one.format: _first(one, given.get(one.name)) for one in found}
+    choices = {one.key: _first(one, given.get(one.name)) for one in found}
     for one, whole in _copies([one for one in found if one.name not in given]):
-        choices[one.name + one.format] = Choice(one, "nothing", f"all that is in it is in {whole.shown} too")
-    open_ = [one for one in found if one.name not in given and choices[one.name + one.format].role == ""]
+        choices[one.key] = Choice(one, "nothing", f"all that is in it is in {whole.shown} too")
+    open_ = [one for one in found if one.name not in given and choices[one.key].role == ""]
     own = next((one.item for one in choices.values() if one.role == "own"), None)
     images = _images(found, choices)
     if own is None and open_:
         own, why = _own(open_, images)
         if own is not None:
-            choices[own.name + own.format] = Choice(own, "own", why)
+            choices[own.key] = Choice(own, "own", why)
     for one in open_:
         if one is not own:
-            choices[one.name + one.format] = _other(one, own, images)
-    return _named([choices[one.name + one.format] for one in found])
+            choices[one.key] = _other(one, own, images)
+    return _named([choices[one.key] for one in found])
 
 
 def _copies(found: Sequence[CardItem]) -> Iterator[tuple[CardItem, CardItem]]:
@@ -378,7 +388,7 @@ def _useless(one: CardItem) -> str:
 
 def _images(found: Sequence[CardItem], choices: Mapping[str, Choice]) -> CardItem | None:
     """The folder with the most images."""
-    folders = [one for one in found if choices[one.name + one.format].role == "images"]
+    folders = [one for one in found if choices[one.key].role == "images"]
     return max(folders, key=lambda one: len(one.log.parts["photos"]) if one.log else 0, default=None)
 
 
@@ -392,8 +402,6 @@ def _own(open_: Sequence[CardItem], images: CardItem | None) -> tuple[CardItem |
             distance, above = _from_images(one, images)
             if _on_board(distance, above):
                 return one, f"it is mostly within {distance:.1f} m of the images"
-        return None, ""
-    if not open_:
         return None, ""
     if len(open_) == 1:
         return open_[0], "it is the only log"
@@ -600,3 +608,191 @@ def _named(choices: list[Choice]) -> list[Choice]:
             one = replace(one, target=name)
         named.append(one)
     return named
+
+
+# -- images: which camera took them, and how their stamps meet the vehicle's log
+
+
+class ImageClock(NamedTuple):
+    """How the images' stamps become flight time.
+
+    Attributes
+    ----------
+    kind
+        ``"utc"``, or ``"sequence"`` for images without any time.
+    offset_s
+        What to add to the stamps.
+    note
+        A sentence on it.
+    triggers
+        Name of the recipe's table of triggers that they have their times from, where there is one.
+    """
+
+    kind: Literal["utc", "sequence"]
+    offset_s: float
+    note: str
+    triggers: str = ""
+
+
+def one_camera(
+    images: CardItem, wanted: str = "", stated: CameraPart | None = None
+) -> tuple[CardItem, str | None, str]:
+    """The images of one camera: of that whose name has what is wanted, else whose images are as large as
+    those of the stated one, else of the thermal one, else of that with the most.
+
+    Parameters
+    ----------
+    images
+        With the part ``photos``.
+    wanted
+        A part of the camera's name, as the user states it.
+    stated
+        The camera, where the user states it.
+
+    Returns
+    -------
+    CardItem, the camera's name (None where all images are of one), and a sentence ("": there is no choice)
+
+    Raises
+    ------
+    WildlabError
+        Where no camera's name has what is wanted.
+    """
+    if images.log is None or "photos" not in images.log.parts:
+        return images, None, ""
+    named = Counter(str(one) for one in images.log.parts["photos"].columns.get("camera", ()))
+    if len(named) < 2 and not wanted:
+        return images, None, ""
+    those = [name for name in named if wanted.lower() in name.lower()]
+    if not those:
+        known = ", ".join(repr(name) for name in named)
+        raise WildlabError(f"no camera's name has {wanted!r}", f"there are {known}", field="--role")
+    if stated is not None and not wanted:
+        columns = images.log.parts["photos"].columns
+        fits = (columns["width_px"] == stated.width_px) & (columns["height_px"] == stated.height_px)
+        those = sorted({str(one) for one in columns["camera"][fits]}) or those
+    thermal = [name for name in those if "thermal" in name.lower()]
+    chosen = max(thermal or those, key=lambda name: named[name])
+    others = ", ".join(f"{count} of {name or 'no name'}" for name, count in named.items() if name != chosen)
+    note = (
+        f"Of {images.shown} {named[chosen]} images of {chosen or 'no named camera'} are taken, not {others}"
+    )
+    note = f"{note} (--role {images.name}=images:NAME chooses)." if others else ""
+    return replace(images, log=of_camera(images.log, chosen)), chosen, note
+
+
+def camera_of_images(
+    images: CardItem, stated: CameraPart | None, focal_px: float | None = None
+) -> tuple[CameraPart | None, str]:
+    """The camera that took the images and how it is known, in a clause; or None and why it is not.
+
+    What the user states, the camera or its focal length alone, counts for more than the tags.
+    """
+    if images.log is None:
+        return None, images.problem
+    columns = images.log.parts["photos"].columns
+    sizes = np.column_stack([columns["width_px"], columns["height_px"]])
+    sizes = np.unique(sizes[np.isfinite(sizes).all(axis=1)], axis=0)
+    if stated is not None:
+        own = (stated.width_px, stated.height_px)
+        if len(sizes) and (sizes != own).any():
+            seen = ", ".join("{:.0f} x {:.0f}".format(*one) for one in sizes[:4])
+            return None, f"the stated camera has {own[0]} x {own[1]} px, and they have {seen}"
+        return stated, "as you stated it"
+    if focal_px is not None:
+        if len(sizes) != 1:
+            return None, "they are of several sizes" if len(sizes) else "nothing says how large they are"
+        names = {str(one) for one in columns.get("camera", ())} - {""}
+        found: dict[str, Any] | None = {
+            **{"camera": names.pop() if len(names) == 1 else "", "focal_px": focal_px},
+            **{"width_px": int(sizes[0, 0]), "height_px": int(sizes[0, 1]), "how": "as you stated it"},
+        }
+    else:
+        try:
+            found = camera_of(images.log)
+        except WildlabError as error:
+            return None, error.problem
+    if found is None:
+        return None, "no tag has the focal length in pixels"
+    width, height, focal = found["width_px"], found["height_px"], found["focal_px"]
+    camera = CameraPart(
+        **{"name": found["camera"] or "not stated", "width_px": width, "height_px": height},
+        **{"fx_px": focal, "fy_px": focal, "cx_px": (width - 1) / 2, "cy_px": (height - 1) / 2},
+    )
+    how = f"{width} x {height} px, focal length {focal:.0f} px ({found['how']})"
+    return camera, f"{how}; a central principal point, no distortion"
+
+
+def clock_of_images(
+    images: CardItem,
+    own: CardItem | None,
+    stated_offset_s: float | None,
+    triggers: tuple[str, Stream] | None = None,
+    others: Sequence[CardItem] = (),
+) -> ImageClock:
+    """How the images meet the vehicle's log.
+
+    By records of their triggers (the recipe's table of them, by name, and its rows); by UTC where they have
+    it; else by the only whole number of quarters of an hour that brings their camera's wall clock into the
+    flight, which ``others``, tracks of targets, know where the vehicle has no log. What the user states to be
+    added to the stamps counts for more.
+    """
+    photos = images.part("photos")
+    columns: dict[str, NDArray[Any]] = {} if photos is None else photos.columns
+    utc, wall = (_known(columns.get(name)) for name in ("time_s", "time_log_s"))
+    if photos is not None and triggers is not None and stated_offset_s is None:
+        clock = _by_triggers(photos, *triggers)
+        if clock is not None:
+            return clock
+    if photos is None or not len(utc) + len(wall):
+        return ImageClock("sequence", 0.0, "The images have no time.")
+    offset = stated_offset_s or 0.0
+    if len(utc):
+        base = images.log.clock if images.log is not None else ""
+        note = f"The images' stamps are {printable(base) if base.startswith('local') else 'in UTC'}."
+        note += f" {offset:g} s are added to them, as you said." if offset else ""
+        return ImageClock("utc", offset, note)
+    if stated_offset_s is not None:
+        return ImageClock("utc", offset, f"The camera's wall clock gets {offset:g} s, as you said.")
+    flown = _flown(own, others)
+    quarters = None if flown is None else quarters_ahead(wall, flown)
+    if quarters is None:
+        note = "The camera's clock is taken for UTC: --zone or --camera-offset."
+        return ImageClock("utc", 0.0, note)
+    note = (
+        f"The camera's clock is taken to be {quarters / 4:+g} h from UTC, which alone brings the images into "
+        "the flight; wildlab clock estimates seconds."
+    )
+    return ImageClock("utc", -quarters * QUARTER_S, note)
+
+
+def _flown(own: CardItem | None, others: Sequence[CardItem]) -> Span | None:
+    """When the flight was: by the vehicle's log, or where it has none by the tracks of targets."""
+    spans = [span for one in others if (span := span_of(one)) is not None]
+    if own is not None or not spans:
+        return None if own is None else span_of(own)
+    return min(span[0] for span in spans), max(span[1] for span in spans)
+
+
+def _by_triggers(photos: Stream, name: str, triggers: Stream) -> ImageClock | None:
+    """By the records of triggers; None where they do not fit for certain."""
+    times = triggers.columns.get("time_s")
+    match = None if times is None else match_images(photos, np.where(triggers.used, times, np.nan))
+    if match is None:
+        return None
+    timed = len(_known(photos.columns.get("time_log_s", photos.columns.get("time_s"))))
+    by = "the pattern of intervals" if timed else "their number and order"
+    return ImageClock(
+        "utc",
+        0.0,
+        f"{len(photos) - match.images_left} of {len(photos)} images have the time of a trigger, by {by} "
+        f"({match.triggers_left} left over).",
+        name,
+    )
+
+
+def _known(column: NDArray[Any] | None) -> NDArray[np.float64]:
+    if column is None:
+        return np.empty(0)
+    values = np.asarray(column, float)
+    return np.asarray(values[np.isfinite(values)])

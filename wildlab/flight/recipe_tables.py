@@ -12,7 +12,18 @@ from numpy.typing import NDArray
 
 from wildlab.flight.checks.findings import NORM_TOLERANCE, POSITION, QUATERNION, VELOCITY
 from wildlab.flight.clocks import covariance_columns
-from wildlab.flight.recipe.model import (
+from wildlab.flight.raw_files import (
+    Array,
+    Nanoseconds,
+    RawFiles,
+    RawTable,
+    Text,
+    numbers,
+    plain_numbers,
+    texts,
+    times,
+)
+from wildlab.flight.recipes import (
     FORMS,
     Attitude,
     Block,
@@ -30,18 +41,7 @@ from wildlab.flight.recipe.model import (
     Velocity,
     YawFromBearing,
 )
-from wildlab.flight.recipe.raw import (
-    Array,
-    Nanoseconds,
-    RawFiles,
-    RawTable,
-    Text,
-    numbers,
-    plain_numbers,
-    texts,
-    times,
-)
-from wildlab.flight.units import Dimension
+from wildlab.flight.schema import Dimension
 from wildlab.geometry.attitude_uncertainty import pose_covariance, tilt_from_roll_pitch
 from wildlab.geometry.frames import (
     R_NED_ENU,

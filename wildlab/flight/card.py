@@ -1,35 +1,53 @@
-"""A recipe in the making: what the user states, the blocks that it gets, and what was decided.
+"""A memory card becomes a flight: its recipe with what was decided, and the flight itself.
 
-What the heights of a card's flight count from is decided once those of all its logs are brought together.
-What is assumed where logs say nothing stands in data, and is written into the recipe with a note.
+The recipe is text that a user can read and change. What the heights of a card's flight count from is decided
+once those of all its logs are brought together. What is assumed where logs say nothing stands in data, and is
+written into the recipe with a note.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+import tempfile
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
 
 from wildlab.errors import WildlabError
-from wildlab.flight.card.images import camera_of_images, clock_of_images, one_camera
-from wildlab.flight.card.roles import OTHER, PARTS_SHOWN, ROLES, Choice, has_place
-from wildlab.flight.files import dump_toml, read_toml
+from wildlab.files import write_atomic
+from wildlab.flight.card_items import (
+    OTHER,
+    PARTS_SHOWN,
+    ROLES,
+    Choice,
+    camera_of_images,
+    choose_roles,
+    clock_of_images,
+    has_place,
+    one_camera,
+    search,
+    source_folder,
+    span_of,
+)
+from wildlab.flight.files import dump_toml, is_safe_name, printable, read_toml
 from wildlab.flight.heights import NO_GRID, HeightPlan, HeightUse, choose_reference
-from wildlab.flight.manifest import CameraPart
-from wildlab.flight.readers.log import Stream
+from wildlab.flight.importing import import_flight
+from wildlab.flight.manifest import CameraPart, TerrainSays
+from wildlab.flight.readers.log import PARTS, Stream
+from wildlab.flight.store import Flight
 from wildlab.paths import DATA
 
 #: Rows that can be used.
 USED: list[dict[str, Any]] = [{"column": "use", "equals": 1.0}]
 #: Rows that have a time; an image without a place is one.
 TIMED: list[dict[str, Any]] = [{"column": "time_s", "above": 0.0}]
-UTC = {"column": "time_s", "format": "unix"}
+STAMP = {"column": "time_s", "format": "unix"}
 #: Below any angle in degrees: a condition that leaves rows without one out.
 NO_ANGLE = -1e6
 #: A vehicle that goes up or down by more than this does not do so at 0 m/s.
@@ -88,7 +106,7 @@ class Proposal:
     source
         The folder that all names are below.
     choices
-        From `roles.choose_roles`.
+        From `choose_roles`.
     wishes
         What the user states.
 
@@ -217,7 +235,7 @@ class Proposal:
 
     def _over_time(self, choice: Choice, part: str, name: str) -> dict[str, Any]:
         """What every block over time has: its table, which of its rows count, and their times."""
-        return {"file": self._table(choice, part, name), "where": USED, "time": UTC}
+        return {"file": self._table(choice, part, name), "where": USED, "time": STAMP}
 
     def _table(self, choice: Choice, part: str, name: str) -> str:
         """The name of a table of one part of a log, with its heights and stamps brought to the flight's."""
@@ -310,6 +328,14 @@ class Proposal:
             [one.item for one in self.by_role["target"]],
         )
         self.notes.append(clock.note)
+        if clock.kind == "sequence" and any(map(self.by_role.get, ("own", "camera", "receiver", "target"))):
+            self.notes.append(
+                "The images are left out: the logs go by time. Import as many images as there are records of "
+                "triggers, or write times into them (exiftool -DateTimeOriginal)."
+            )
+            del data["camera"]
+            self.logs.pop("triggers", None)
+            return
         if records is not None and not clock.triggers and wishes.camera_offset_s is None:
             self.notes.append(f"{int(records[1].used.sum())} triggers fit no images for certain: not used.")
         id_ = "stem" if len(set(_stems(photos))) == len(photos) else "file"
@@ -322,7 +348,7 @@ class Proposal:
         if clock.kind == "sequence":
             data["time"] = {"kind": "sequence"}
         else:
-            frames |= {"time": UTC, "where": TIMED}
+            frames |= {"time": STAMP, "where": TIMED}
         if clock.offset_s:
             data["clocks"] = {"camera_offset_s": clock.offset_s}
         data["frames"] = frames
@@ -486,19 +512,21 @@ def _refuse_without_zone(choices: Sequence[Choice]) -> None:
         return
     for one in choices:
         if one.role == "nothing" and "without a zone" in one.why:
-            raise WildlabError(
-                f"the clock of {one.item.shown} is local time of no stated zone",
-                f"state it, as --zone Europe/Oslo, or leave it out: --role {one.item.name}=nothing",
-                field="--zone",
-            )
+            raise _no_zone(one)
+
+
+def _no_zone(choice: Choice) -> WildlabError:
+    return WildlabError(
+        f"the clock of {choice.item.shown} is local time of no stated zone",
+        f"state it, as --zone Europe/Oslo, or leave it out: --role {choice.item.name}=nothing",
+        field="--zone",
+    )
 
 
 def _no_utc(choice: Choice) -> WildlabError:
     """What to state of a log that does not know UTC."""
-    clock = choice.item.log.clock if choice.item.log is not None else None
-    if clock is not None and "zone" in clock.base:
-        problem = f"the clock of {choice.item.shown} is local time of no stated zone"
-        return WildlabError(problem, "state it, as --zone Europe/Oslo", field="--zone")
+    if choice.item.log is not None and "zone" in choice.item.log.clock:
+        return _no_zone(choice)
     problem = f"the clock of {choice.item.shown} does not know UTC"
     return WildlabError(
         problem, "state when it stood at zero, as --start 2026-05-01T06:00:00Z", field="--start"
@@ -631,3 +659,140 @@ def _together(stream: Stream, names: Sequence[str]) -> Any:
     if any(name not in stream.columns for name in names):
         return None
     return np.column_stack([stream.columns[name] for name in names])[stream.used]
+
+
+# -- a card, read and imported
+
+
+def read_card(
+    paths: Sequence[Path],
+    wishes: Wishes,
+    roles: Mapping[str, str],
+    tell: Callable[[str], None] = lambda name: None,
+) -> Proposal:
+    """Read files and folders, choose what each is for, and write down how a flight is made of them.
+
+    Parameters
+    ----------
+    paths
+        Files and folders: raw logs, folders of images, a whole memory card. Only read.
+    wishes, roles
+        As for `Proposal` and `choose_roles`.
+    tell
+        Called with the name of each file before it is read.
+
+    Raises
+    ------
+    WildlabError
+        Where nothing of it makes a flight, with the reason.
+    """
+    source = source_folder(paths)
+    found = search(paths, source, wishes.zone, tell)
+    if all(one.problem == OTHER for one in found):
+        raise WildlabError("nothing in it is a log or an image", "name the folder of the logs", file=source)
+    choices = choose_roles(found, roles)
+    try:
+        return Proposal(source, choices, wishes)
+    except WildlabError as error:
+        if error.file is not None:
+            raise
+        seen = "; ".join(f"{one.item.shown}: {one.role} ({printable(one.why)})" for one in choices[:20])
+        raise WildlabError(
+            f"{error.problem}. Found: {seen}", error.fix, file=source, field=error.field
+        ) from None
+
+
+def recipe_beside(flight: Path) -> Path:
+    """Where the recipe of a flight lies: beside its folder."""
+    return flight.with_name(f"{flight.name}.recipe.toml")
+
+
+def import_card(
+    card: Proposal,
+    into: Path,
+    overwrite: bool = False,
+    calibration: Path | None = None,
+    terrain: TerrainSays | None = None,
+) -> Flight:
+    """Write a card's flight, and its recipe beside it: both, or neither.
+
+    Parameters
+    ----------
+    card
+        From `read_card`.
+    into, overwrite, calibration, terrain
+        As for `import_flight`.
+
+    Raises
+    ------
+    WildlabError
+        As `import_flight`; and where there is a recipe already.
+    """
+    beside = recipe_beside(into)
+    if beside.exists() and not overwrite:
+        fix = "choose another, or --overwrite"
+        raise WildlabError("there is a recipe already", fix, file=beside)
+    with tempfile.TemporaryDirectory(prefix="wildlab-") as folder:
+        path = Path(folder) / beside.name
+        path.write_text(card.recipe, encoding="utf-8")
+        flight = import_flight(path, card.source, into, overwrite, calibration, terrain)
+    write_atomic(beside, card.recipe.encode("utf-8"))
+    return flight
+
+
+def safe_name(text: str) -> str:
+    """A flight's name out of a folder's."""
+    name = re.sub(r"[^A-Za-z0-9_-]+", "-", text).strip("-_")[:100]
+    return name if is_safe_name(name) else "flight"
+
+
+#: Headings of `rows_of`.
+HEADINGS = ("file", "format", "begins (UTC)", "lasts", "role")
+
+
+def rows_of(choices: Sequence[Choice]) -> list[list[str]]:
+    """A row for each thing that was found, under `HEADINGS`."""
+    return [_row(one) for one in choices if one.item.problem != OTHER]
+
+
+def _row(choice: Choice) -> list[str]:
+    found, role = choice.item, choice.role + (f" {choice.target}" if choice.target else "")
+    spans = [span for part in PARTS if (span := span_of(found, [part]))]
+    begins = lasts = ""
+    if spans:
+        first, last = min(one[0] for one in spans), max(one[1] for one in spans)
+        begins, lasts = f"{datetime.fromtimestamp(first, UTC):%Y-%m-%d %H:%M:%S}", f"{last - first:.0f} s"
+    return [found.shown, found.called, begins, lasts, role]
+
+
+def sentences_of(choices: Sequence[Choice]) -> list[str]:
+    """What of each thing is not used and why, what was lost, and what its reader noted."""
+    notes = []
+    others = [one.item.shown for one in choices if one.item.problem == OTHER]
+    if others:
+        more = f" and {len(others) - 3} more" if len(others) > 3 else ""
+        notes.append(f"No logs by their endings, and not looked at: {', '.join(others[:3])}{more}")
+    for one in choices:
+        log, name = one.item.log, one.item.shown
+        own = [f"is not used: {printable(one.why)}"] if one.role == "nothing" or log is None else []
+        if one.item.problem == OTHER:
+            continue
+        if log is not None:
+            if not own:
+                own = [f"is taken for {ROLES[one.role]}{one.target and f', {one.target}'}: {one.why}"]
+            own = [log.vehicle and f"is of {log.vehicle}", *own]
+            # An image without a place is one all the same, and its reader says what it lacks.
+            own += [
+                _unused(part, rows)
+                for part, rows in log.parts.items()
+                if part != "photos" and not rows.used.all()
+            ]
+            own += [*log.lost, *log.notes]
+        notes += [f"{name}: {printable(text)}" for text in own if text]
+    return notes
+
+
+def _unused(part: str, stream: Stream) -> str:
+    reasons = Counter(str(why) for why in stream.columns["why"] if why)
+    told = ", ".join(f"{count} {why}" for why, count in reasons.most_common())
+    return f"{int((~stream.used).sum())} of {len(stream)} rows of {part} are not used ({told})"

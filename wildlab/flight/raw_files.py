@@ -31,14 +31,14 @@ import scipy.io
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.clock_fitting import match_triggers
+from wildlab.flight.clock_fitting import TriggerMatch, find_zone, match_triggers
 from wildlab.flight.files import did_you_mean, inside, printable, read_regular
+from wildlab.flight.readers import FOLDERS, read_folder, read_log
 from wildlab.flight.readers.autoferry import Part, read_part
-from wildlab.flight.readers.formats import FOLDERS, read_folder, read_log
 from wildlab.flight.readers.log import RawLog, Stream
 from wildlab.flight.readers.photos import of_camera
-from wildlab.flight.recipe.model import Decimal, LogTable, MatlabTable, Quantity, Series, Stamp
-from wildlab.flight.units import Dimension, factor, find_zone
+from wildlab.flight.recipes import Decimal, LogTable, MatlabTable, Quantity, Series, Stamp
+from wildlab.flight.schema import Dimension, factor
 
 _WHOLE = re.compile(r"[-+]?\d+", re.ASCII)
 #: Rows that are Python strings at a time.
@@ -156,24 +156,18 @@ def read_matlab(path: Path, data: bytes) -> dict[str, Any]:
     WildlabError
         Where it is of another format, damaged, or too large.
     """
+    remedy = "save it in MATLAB with -v7"
     if data[:8] == _HDF5 or data[512:520] == _HDF5 or data[:10] == b"MATLAB 7.3":
-        raise WildlabError(
-            "is of version 7.3 (HDF5), which is not read",
-            "save it in MATLAB with -v7",
-            file=path,
-        )
+        raise WildlabError("is of version 7.3 (HDF5), which is not read", remedy, file=path)
     if data[:10] != b"MATLAB 5.0" or len(data) < _HEADER or data[126:128] not in (b"IM", b"MI"):
-        raise WildlabError("is no MATLAB file of version 5 to 7", "save it in MATLAB with -v7", file=path)
+        raise WildlabError("is no MATLAB file of version 5 to 7", remedy, file=path)
     try:
         size = _unpacked(data)
     except (zlib.error, struct.error) as error:
         raise _damaged(path, error) from None
     if size > MOST_BYTES:
-        raise WildlabError(
-            f"holds more than {MOST_BYTES >> 20} MiB once it is unpacked",
-            "save only what the recipe needs",
-            file=path,
-        )
+        problem = f"holds more than {MOST_BYTES >> 20} MiB once it is unpacked"
+        raise WildlabError(problem, "save only what the recipe needs", file=path)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -371,7 +365,7 @@ class RawFiles:
         except FileNotFoundError:
             raise WildlabError(
                 f"there is no such file, and [{part}] of {self.recipe.name} asks for it",
-                "check its name and the source folder",
+                "check its name, and name its folder with --source",
                 file=path,
                 field=f"{part}.file",
             ) from None
@@ -598,10 +592,7 @@ def plain_numbers(table: RawTable, column: str, part: str, *, may_be_empty: bool
     if bad.any():
         row = int(np.argmax(bad))
         cell = table.cell(column, row)
-        problem, fix = (
-            "is not a finite number",
-            "mend the cell, or take the row out",
-        )
+        problem, fix = "is not a finite number", "mend the cell, or take the row out"
         if _DECIMAL_COMMA.fullmatch(cell):
             problem, fix = "has a decimal comma", "write `decimal = ','` beside file"
         raise table.fail(f"{_short(cell)} {problem}", fix, column, part, row)
@@ -765,22 +756,37 @@ def of_images(pixels: Stream, images: Stream) -> Stream:
     return Stream({**pixels.columns, "use": use, "why": why}, pixels.rows, pixels.counted_in)
 
 
+def match_images(images: Stream, of_record: Array) -> TriggerMatch | None:
+    """Which image is of which record (N,) of a trigger; None where that is not certain.
+
+    By the pattern of their stamps; of images without any, by their number and order.
+    """
+    stamps = images.columns.get("time_log_s", images.columns.get("time_s"))
+    if stamps is None or not np.isfinite(stamps).any():
+        known = np.flatnonzero(np.isfinite(of_record))
+        return TriggerMatch(known, 0, 0, True) if len(known) == len(images) else None
+    try:
+        match = match_triggers(stamps, of_record)
+    except WildlabError:
+        return None
+    return match if match.certain else None
+
+
 def stamped_by(images: Stream, triggers: Stream, path: Path) -> Stream:
-    """Images with the times of the records of their triggers; those without a record have none.
+    """Images with the times of the records of their triggers; those without a record have none. Images
+    without any stamp have those of as many records, in the order of both.
 
     Raises
     ------
     WildlabError
-        Where neither has times, or no image belongs to a record for certain.
+        Where no record has a time, or no image belongs to a record for certain.
     """
-    stamps = images.columns.get("time_log_s", images.columns.get("time_s"))
     times = triggers.columns.get("time_s")
-    if stamps is None or times is None:
-        problem = "the images or triggers have no times"
-        raise WildlabError(problem, "take out triggers", file=path, field="triggers")
+    if times is None:
+        raise WildlabError("the triggers have no times", "take out triggers", file=path, field="triggers")
     of_record = np.where(triggers.used, times, np.nan)
-    match = match_triggers(stamps, of_record)
-    if not match.certain:
+    match = match_images(images, of_record)
+    if match is None:
         raise WildlabError(
             "images and triggers do not fit for certain",
             "give camera_offset_s in [clocks] instead",

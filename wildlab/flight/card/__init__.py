@@ -1,1 +1,0 @@
-"""A memory card as it is: which file is what, which role each has in a flight, and a recipe that says so."""
