@@ -23,7 +23,7 @@ from wildlab.analysis.image_coverage import (
     ordered,
 )
 from wildlab.evaluation.streams import FINE, HARMFUL, Pace, pace_of, runs_of, vibration_of
-from wildlab.flight.checks.check import Use, find, usable_for
+from wildlab.flight.checks.check import Finding, Use, find, usable_for
 from wildlab.flight.clocks import frame_times, gnss_times, longest_gap
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array, matrix_to_euler, quaternion_to_matrix
@@ -263,7 +263,7 @@ class Overview:
     uses
         What the flight is good for.
     problems
-        How many the checks of its tables have found.
+        What the checks of its tables have found that cannot be used.
     """
 
     flight: Flight
@@ -280,7 +280,7 @@ class Overview:
     detections: tuple[int, int, int]
     lost: tuple[Recovered, ...]
     uses: tuple[Use, ...]
-    problems: int
+    problems: tuple[Finding, ...]
 
     @property
     def detections_in_images(self) -> int:
@@ -333,7 +333,7 @@ def look_over(flight: Flight, source: str | None = None) -> Overview:
     >>> from wildlab.simulation.twins import simulate_twin
     >>> found = look_over(simulate_twin("large-ship", 1))
     >>> found.path.who, found.problems
-    ('nav/autopilot', 0)
+    ('nav/autopilot', ())
     """
     if source is not None:
         flight.pose_source(source)
@@ -361,7 +361,7 @@ def look_over(flight: Flight, source: str | None = None) -> Overview:
         detections=detections_of(flight, source),
         lost=tuple(sorted(lost_data(flight, source, streams), key=lambda one: -one.share)),
         uses=tuple(usable_for(flight)),
-        problems=sum(one.level == "problem" for one in find(flight, meaning=False)),
+        problems=tuple(one for one in find(flight, meaning=False) if one.level == "problem"),
     )
 
 

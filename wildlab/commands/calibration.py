@@ -271,7 +271,8 @@ def calibrate(flight: Path, out: Path, overwrite: bool, source: str | None, seed
     from wildlab.flight.calibration_files import write_calibration
     from wildlab.flight.checks.check import sense_sentences
     from wildlab.flight.store import load_flight
-    from wildlab.reporting.georeferencing import simplest_rivals, words_of_causes
+    from wildlab.reporting.georeferencing import words_of_causes
+    from wildlab.reporting.georeferencing_tables import simplest_rivals
 
     refuse_existing(out, overwrite)
     loaded = load_flight(flight)
@@ -306,7 +307,7 @@ def calibrate(flight: Path, out: Path, overwrite: bool, source: str | None, seed
     else:
         click.echo(f"No constant error is certain ({len(diagnosis.models)} models tried).")
     if gain is None and (others := simplest_rivals(diagnosis)):
-        one, other = words_of_causes(winner.causes), words_of_causes(others[0])
+        one, other = words_of_causes(winner.causes), words_of_causes(diagnosis.models[others[0]].causes)
         click.echo(f"These images do not separate {one} from {other}.")
     click.echo("The noise of its poses takes the place of the standard deviations that a flight states.")
     click.echo(shown(out))

@@ -48,6 +48,7 @@ from wildlab.reporting.georeferencing_tables import (
     parameters_table,
     parts_table,
     significant_parameters,
+    simplest_rivals,
     terrain_section,
 )
 from wildlab.reporting.layout import ADVICE
@@ -205,13 +206,6 @@ def significant_causes(diagnosis: Diagnosis) -> tuple[str, ...]:
     return tuple(cause for cause in causes if parameters & set(CAUSES[cause])) or causes
 
 
-def simplest_rivals(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
-    """Causes of the rivals that hold no other rival, the two of the least held-out error at most."""
-    rivals = [one for one in diagnosis.rivals if one.causes and one.causes != diagnosis.winner.causes]
-    simple = [one for one in rivals if not any(set(other.causes) < set(one.causes) for other in rivals)]
-    return [one.causes for one in sorted(simple, key=lambda one: one.gain.with_)][:2]
-
-
 def words_of_causes(causes: Sequence[str]) -> str:
     """Causes as they stand in a sentence."""
     names = load_texts("georeferencing").subjects
@@ -237,7 +231,8 @@ def cause_message(diagnosis: Diagnosis | None) -> Message:
         "with": short_length(winner.gain.with_),
     }
     if not diagnosis.counts:
-        others = [one for one in simplest_rivals(diagnosis) if not set(causes) <= set(one)]
+        simplest = [diagnosis.models[m].causes for m in simplest_rivals(diagnosis)]
+        others = [one for one in simplest if not set(causes) <= set(one)]
         if others:
             rivals = listed([words_of_causes(one) for one in others], "or")
             return Message("cause-inseparable", {**values, "others": rivals})
@@ -376,20 +371,16 @@ def limits(
         ("limit-clock-fitted", manifest.kind != "twin" and abs(rest) > 1e-6, {"offset": f"{rest:+.2f}"}),
         ("limit-halves", bool(found.halves.disagree), {}),
         ("limit-nearest", found.visible_m == found.visible_m, {"hidden": short_length(found.visible_m)}),
-        ("limit-track", truth.tracked > 0, {"sd": _sd_words(truth.track_sd_m)}),
+        ("limit-track", truth.tracked > 0, {"sd": measure(truth.track_sd_m, "m")}),
         ("limit-wander", diagnosis is not None and diagnosis.counts, {}),
         ("limit-unlabelled", bool(programs), {}),
         ("limit-untimed", not timed, {}),
         ("limit-vertical", bool(manifest.vertical.correction_m), {}),
-        ("limit-mark", truth.marked > 0, {"sd": _sd_words(truth.mark_sd_m)}),
+        ("limit-mark", truth.marked > 0, {"sd": measure(truth.mark_sd_m, "m")}),
         ("limit-marking", True, {}),
         ("limit-ground", True, {}),
     )
     return [Message(key, values) for key, applies, values in conditional if applies][:5]
-
-
-def _sd_words(sd_m: float) -> str:
-    return measure(sd_m, "m") if np.isfinite(sd_m) else "–"
 
 
 # -- the page
@@ -426,11 +417,10 @@ def show_advice(report: Report, said: Sequence[str]) -> None:
         report.points(said, ordered=True)
 
 
-def show_contradictions(report: Report, amiss: Sequence[str], *, shown: bool) -> None:
-    """What does not fit together in the flight; only how much where its locations are not open."""
+def show_contradictions(report: Report, amiss: Sequence[str]) -> None:
+    """What does not fit together in the flight: these sentences name no place."""
     if amiss:
-        hidden = [f"{len(amiss)} found: `wildlab check` says what."]
-        report.alert("What does not fit together", list(amiss) if shown else hidden)
+        report.alert("What does not fit together", amiss)
 
 
 def show_accuracy(
@@ -477,7 +467,7 @@ def show_accuracy(
     show_summary(report, wording, found, problems, calibrated_elsewhere=bool(applied))
     if applied:
         report.text(" ".join(words("georeferencing", applied)))
-    show_contradictions(report, amiss, shown=shown)
+    show_contradictions(report, amiss)
     logged, diagnosis = found.summary, found.diagnosis
     corrections = (
         parameters_table(report, diagnosis.calibration) if diagnosis and diagnosis.winner.causes else None
@@ -664,7 +654,7 @@ def show_repeats(report: Report, flight: Flight, found: Repeats, amiss: Sequence
         said += cause.messages([cause_message(diagnosis)])
     report.summary(said, level=word.colour, verdict=(word.value, wording.messages([reason])[0]))
     report.metric(VERDICT_LEVEL, "georeferencing", word.level, "1")
-    show_contradictions(report, amiss, shown=flight.manifest.locations.sensitivity == "open")
+    show_contradictions(report, amiss)
     if spread is not None:
         report.metric("sighting_spread", "logged-pose", spread.sd, "m", n=spread.sightings)
         report.metric("sighting_consistency", "logged-pose", spread.consistent, "1", n=spread.sightings)

@@ -104,12 +104,20 @@ def beside_published(published: pd.DataFrame, theirs: ErrorSummary, ours: ErrorS
     )
 
 
+def simplest_rivals(diagnosis: Diagnosis) -> list[int]:
+    """Numbers of the rivals that hold no other rival, the two of the least held-out error at most."""
+    models, winner = diagnosis.models, diagnosis.winner
+    rivals = [m for m in diagnosis.ranked.rivals if models[m].causes not in ((), winner.causes)]
+    held = [set(models[m].causes) for m in rivals]
+    simple = [m for m in rivals if not any(one < set(models[m].causes) for one in held)]
+    return sorted(simple, key=lambda m: models[m].gain.with_)[:2]
+
+
 def models_table(diagnosis: Diagnosis) -> pd.DataFrame:
-    """The most likely models, the winner bold, and the poses as logged."""
-    shown = list(np.argsort(diagnosis.ranked.scores, kind="stable")[:SHOWN])
-    shown += [m for m in (diagnosis.ranked.winner, 0) if m not in shown]
+    """The most likely models, the winner bold, rivals that the page names, and the poses as logged."""
+    likeliest = np.argsort(diagnosis.ranked.scores, kind="stable")[:SHOWN].tolist()
     rows = []
-    for m in shown:
+    for m in dict.fromkeys([*likeliest, diagnosis.ranked.winner, *simplest_rivals(diagnosis), 0]):
         model = diagnosis.models[m]
         gain = model.gain.gain
         rows.append(

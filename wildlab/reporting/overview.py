@@ -196,6 +196,16 @@ def reason(found: Judged, counts: Mapping[str, int]) -> Message:
     return Message("reason-sound", {"count": str(found.judged)})
 
 
+def advice(found: Judged) -> list[Message]:
+    """What to do, the most pressing first, `MOST` at most."""
+    said = [Message("problems-remedy")] if found.problems else []
+    # What is far out may come of what contradicts itself, or of a constant error that is not certain.
+    unsure = found.problems > 0 or found.possible is not None
+    told = (gain_message(gain) for gain in found.gains if not (unsure and gain.key == "far_out"))
+    said += [Message(f"{one.key}-remedy", one.values) for one in told]
+    return said[:MOST]
+
+
 def limits(overview: Overview, lacking: Sequence[str]) -> list[Message]:
     """What the report does not tell; five at most."""
     said = [Message("limit-lacking", {"what": one}) for one in lacking[:2]]
@@ -455,22 +465,19 @@ def show_overview(
         How many of the other reports there are.
     """
     wording = Wording(report, load_texts("overview"))
-    problems = overview.problems + sum(one.startswith("problem") for one in amiss)
+    amiss = [*(f"problem: {one.sentence} {one.fix}" for one in overview.problems), *amiss]
+    problems = sum(one.startswith("problem") for one in amiss)
     possible = possible_gain(numbers)
     counts = counts_of(overview, gains, problems, judged, possible)
     word = verdict_of(evidence_of(counts, numbers))
     found = Judged(
         overview, gains, problems, word, possible, doubted(numbers), judged, error_measured(numbers)
     )
-    shown = overview.flight.manifest.locations.sensitivity == "open"
     report.head(wording.texts.subjects["question"], subtitle(overview))
     wording.summary(answer(found), word, reason(found, counts))
     report.tiles(tiles(overview))
-    show_advice(report, wording.messages(_with_remedies(gains[:MOST])))
-    if overview.problems:
-        (title,) = wording.messages([Message("tables", {"problems": str(overview.problems)})])
-        report.alert(title, [])
-    show_contradictions(report, amiss, shown=shown)
+    show_advice(report, wording.messages(advice(found)))
+    show_contradictions(report, amiss)
     _show_figures(wording, overview)
     record(report, overview, gains, counts)
     report.limits(wording.messages(limits(overview, lacking)))
@@ -484,12 +491,6 @@ def show_overview(
     for key, frame in frames.items():
         wording.table(key, frame)
     report.method(wording.say(wording.texts.method, METHOD_VALUES))
-
-
-def _with_remedies(gains: Sequence[Gain]) -> Iterator[Message]:
-    for gain in gains:
-        message = gain_message(gain)
-        yield Message(f"{message.key}-remedy", message.values)
 
 
 def _show_figures(wording: Wording, overview: Overview) -> None:

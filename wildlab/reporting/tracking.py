@@ -127,13 +127,12 @@ def split_together(known: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
 
 
 def leading_rows(rows: pd.DataFrame) -> pd.DataFrame:
-    """The tracks of the filter that leads, of one sensor each if any; those with truth where any has."""
-    known = rows[rows["compared"] > 0]
-    if len(known):
-        _, alone = split_together(known)
-        return alone[alone["filter"] == leading_filter(alone)]
-    tracked = rows[rows["detections"] > 0]
-    return tracked[tracked["filter"] == leading_filter(tracked)] if len(tracked) else tracked
+    """One track of each target by each sensor, of one sensor each if any: that of the filter that leads,
+    first those that have one; else, where a sensor's detections cannot go through it, the first."""
+    _, alone = split_together(rows[rows["used"] > 0])
+    other = alone["filter"] != leading_filter(alone)
+    ordered = alone.loc[other.sort_values(kind="stable").index]
+    return ordered.drop_duplicates(["sensor", "target"])
 
 
 def worse_together(rows: pd.DataFrame) -> Message | None:
@@ -476,6 +475,8 @@ def _show_figures(
     name = leading_filter(rows)
     name_of_nav, nav = flight.pose_source(source)
     platforms = {name_of_nav: nav[["north_m", "east_m"]].to_numpy(float)}
+    moving = {one.target for one in followed.tracks if not is_at_rest(one)}
+    shown = shown.sort_values("target", key=lambda names: ~names.isin(moving), kind="stable")
     maps = []
     for target in list(dict.fromkeys(shown["target"]))[:MOST_DRAWN]:
         truth = np.empty((0, 2))

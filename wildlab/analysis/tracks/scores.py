@@ -247,7 +247,8 @@ def compare_sensors(followed: TrackingResult) -> list[SensorPair]:
 
 def is_at_rest(one: SensorTrack) -> bool:
     """Whether a track is of a target that never moves: it has no velocity to be uncertain of."""
-    return not np.nan_to_num(one.covariance[:, 2:4, 2:4]).any()
+    velocity = one.covariance[np.isfinite(one.estimate[:, 0]), 2:4, 2:4]
+    return len(velocity) > 0 and not velocity.any()
 
 
 def _between(one: SensorTrack, times: Array, density: float) -> tuple[Array, Array]:
