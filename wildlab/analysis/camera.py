@@ -25,8 +25,6 @@ from wildlab.geometry.intrinsics import (
     LensChoice,
     calibrate_camera,
     choose_lens,
-    confused,
-    direction_sd,
     parameters_of,
     view_errors,
 )
@@ -379,17 +377,8 @@ def _refuse_few(images: list[BoardImage], n: int, board: Board) -> None:
 COVERED = 0.8
 #: Fewer views than this give wide intervals.
 PLENTY = 15
-#: What a focal length may be off by at the corner of the image (1 SD) without a word, pixels.
-MATTERS_PX = 0.5
 #: Tilts less than this (degrees) hardly tell focal length from distance.
 FLAT_DEG = 15.0
-#: A direction that is off by more than this (pixels, one standard deviation) at a corner is worth a sentence.
-ROUGH_PX = 2.0
-#: Names as a reader knows them.
-WORDS = {
-    "f": "the focal length", "fx": "the focal length of columns", "fy": "the focal length of rows",
-    "cx": "the principal point's column", "cy": "the principal point's row",
-}  # fmt: skip
 
 
 def _boards(found: CameraCalibration) -> Fact:
@@ -425,55 +414,6 @@ def _covered(found: CameraCalibration) -> Fact:
     return fact(key, share=f"{100 * held.mean():.0f}", worst=worst, least=f"{100 * shares[worst]:.0f}")
 
 
-def _directions(found: CameraCalibration) -> Fact:
-    """How well directions are known in the middle and at the worst corner."""
-    w, h = found.width, found.height
-    places = {"the middle": (w / 2, h / 2)} | {
-        f"the {row} {column} corner": (u, v)
-        for row, v in (("upper", 0.0), ("lower", h - 1.0))
-        for column, u in (("left", 0.0), ("right", w - 1.0))
-    }
-    sd = dict(zip(places, direction_sd(found.found, np.array(list(places.values()))), strict=True))
-    if blind := [name for name, one in sd.items() if not np.isfinite(one)]:
-        return fact("camera-folds", places=" and ".join(blind))
-    worst = max(sd, key=lambda name: sd[name])
-    kind = "even" if worst == "the middle" else "rough" if sd[worst] > ROUGH_PX else "corner"
-    return fact(f"camera-{kind}", middle=f"{sd['the middle']:.1f}", worst=f"{sd[worst]:.1f}", place=worst)
-
-
-def tilts_deg(found: Intrinsics) -> Array:
-    """By how much the board is tilted against the image in each view, (V,) degrees."""
-    return np.degrees(np.arccos(np.clip(np.abs(found.views.rotation[:, 2, 2]), 0, 1)))
-
-
-def rim_px(found: Intrinsics) -> float:
-    """By how much the least certain focal length moves a point at the corner of the image, 1 SD, pixels."""
-    sd = np.sqrt(np.diag(found.covariance))
-    focal = [name in ("f", "fx", "fy") for name in found.names]
-    share = float(np.max(sd[focal] / found.values[focal], initial=0.0))
-    return float(share * np.hypot(found.camera.width, found.camera.height) / 2)
-
-
-def _confused(found: CameraCalibration) -> list[Fact]:
-    """Which parameters the views cannot tell apart, and what would help."""
-    tilt, facts = f"{tilts_deg(found.found).max():.0f}", []
-    for group in confused(found.found):
-        names = listed([WORDS.get(one, one) for one in group])
-        kind = "edges"
-        if set(group) <= {"k1", "k2", "k3"}:
-            kind = "lens"
-        elif set(group) & {"f", "fx", "fy"}:
-            # Two focal lengths change together wherever the board stands; it matters where both are vague.
-            if rim_px(found.found) < MATTERS_PX:
-                continue
-            kind = "tilt"
-        lens = "k1" if "k3" not in group else "k1-k2"
-        facts.append(fact(f"camera-confused-{kind}", names=names, tilt=tilt, lens=lens))
-    if tilts_deg(found.found).max() < FLAT_DEG:
-        facts.append(fact("camera-flat", tilt=tilt))
-    return facts
-
-
 def _odd(found: CameraCalibration) -> list[Fact]:
     """Views that disagree with the rest, and what becomes of the estimate without them."""
     rest = found.without_odd
@@ -485,7 +425,7 @@ def _odd(found: CameraCalibration) -> list[Fact]:
     moved = ", ".join(
         f"{name} {found.found.value(name):.1f} -> {rest.value(name):.1f}"
         for name in found.found.names
-        if name in WORDS
+        if name in (*PINHOLE, "f")
     )
     option = " ".join(f"--without {name}" for name in found.odd)
     return [
@@ -497,6 +437,11 @@ def _odd(found: CameraCalibration) -> list[Fact]:
 
 def facts_of(found: CameraCalibration) -> list[Fact]:
     """All that is said of a calibration, in order; its words are in ``data/messages/en/terminal.toml``."""
-    few = [fact("camera-few", views=len(found.views), plenty=PLENTY)] if len(found.views) < PLENTY else []
-    first = [_boards(found), _fit(found), _covered(found), _directions(found)]
-    return [*first, *_confused(found), *_odd(found), *few]
+    said = [_boards(found), _fit(found), _covered(found)]
+    tilted = np.degrees(np.arccos(np.clip(np.abs(found.found.views.rotation[:, 2, 2]), 0, 1))).max()
+    if tilted < FLAT_DEG:
+        said.append(fact("camera-flat", tilt=f"{tilted:.0f}"))
+    said += _odd(found)
+    if len(found.views) < PLENTY:
+        said.append(fact("camera-few", views=len(found.views), plenty=PLENTY))
+    return said
