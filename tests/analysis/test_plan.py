@@ -81,7 +81,7 @@ def test_plans_warn_of_few_pixels_and_of_a_head_wind(field, given, facts):
         {"battery_min": 30.0, "animals": 3.0, "photo_m": 5.0, "names": True},
         {"turn_radius_m": 40.0, "wind_m_s": 4.0, "wind_from_deg": 90.0, "heights": "ground"},
         {"gimbal": "adaptive", "swing_deg": 20.0, "tilt_deg": 70.0, "trees_m": 5.0},
-        {"exposure_s": 0.4, "gimbal": "roll", "swing_deg": 30.0, "home": (58.66, 16.46)},
+        {"exposure_ms": 400.0, "gimbal": "roll", "swing_deg": 30.0, "home": (58.66, 16.46)},
     ],
 )
 def test_every_fact_has_its_words(field, given):

@@ -4,6 +4,7 @@ from.
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -22,6 +23,7 @@ from wildlab.evaluation.intervals import Interval, share_interval
 from wildlab.evaluation.matching import Rates, match, rates
 from wildlab.flight.readers.frames import Frame
 from wildlab.geometry.frames import Array, Indices, Mask
+from wildlab.paths import DATA
 
 #: What is tried: where regions come from and end, how far detections are apart, how sure they are at least.
 REGIONS = tuple(
@@ -296,41 +298,8 @@ def fit_part(
     return PartFit(part_of(every), len(every), share)
 
 
-#: What is tried of each threshold. Lengths in px and levels go up by about a half, as what they gain does.
-GRIDS: dict[str, dict[str, tuple[Any, ...]]] = {
-    "contrast": {
-        "window_px": (31, 61, 101),
-        "smooth_px": (0.7, 1.0, 2.0),
-        "deviation": ("image", "window"),
-        "peak": (4.0, 6.0, 9.0, 13.0, 18.0, 26.0),
-        "edge": (2.5, 4.0),
-        "of_peak": (0.0, 0.3, 0.5, 0.6),
-        "of_image": (0.0, 0.3, 0.6),
-        "smallest_px": (4.0, 10.0, 20.0, 40.0, 80.0),
-        "largest_px": (300.0, 600.0, 1200.0, 4000.0),
-        "longest": (2.5, 4.0, 8.0),
-    },
-    "warm": {
-        "background": ("none", "enhance", "mean", "median"),
-        "threshold": ("constant", "adaptive"),
-        "level": (25.0, 40.0, 65.0, 90.0, 120.0, 160.0, 200.0),
-        "level_is": ("floor", "offset"),
-        "block_px": (51, 101, 251, 451),
-        "smallest_px": (4.0, 10.0, 20.0, 40.0, 80.0),
-        "largest_px": (300.0, 600.0, 1200.0, 4000.0),
-        "apart_px": (0.0, 10.0, 20.0),
-    },
-    "floating": {
-        "gradient": (60.0, 110.0, 160.0, 230.0),
-        "gradient_gain": (0.5, 1.0, 2.0, 4.0),
-        "scaling": ("fixed", "stretched"),
-        "smallest_range_k": (2.0, 4.0, 8.0),
-        "smallest_area": (5.0, 15.0, 50.0, 120.0),
-        "largest_area": (None, 1000.0, 4000.0),
-        "area_of": ("edges", "filled"),
-        "nested": ("boxes", "contours"),
-    },
-}
+#: What is tried of each threshold, by method.
+GRIDS: dict[str, dict[str, list[Any]]] = tomllib.loads((DATA / "thresholds.toml").read_text("utf-8"))
 #: Sets of thresholds that are tried, the defaults among them; and most labelled frames that are looked at.
 TRIED, MOST_FRAMES = 160, 200
 

@@ -168,7 +168,7 @@ def images_of(plan: Plan, sortie: Sortie) -> Images:
     for run in np.split(rows, np.flatnonzero(np.diff(row_of[rows]) != 0) + 1):
         if len(run) > 1:
             slant = plan.view.slant * plan.height
-            blurred[run] = blur(wanted.camera, poses.take(run), times[run], wanted.exposure_s, slant)
+            blurred[run] = blur(wanted.camera, poses.take(run), times[run], wanted.exposure_ms / 1000, slant)
     most = SHARP * plan.view.pixels(wanted.camera, wanted.animal_m, plan.height)
     return Images(poses.take(rows), (blurred <= most)[rows])
 

@@ -222,7 +222,7 @@ def assumed(plan: Plan) -> list[Fact]:
             "counts",
             edge=f"{100 * EDGE:.0f}",
             furthest=FURTHEST,
-            exposure=1000 * wanted.exposure_s,
+            exposure=wanted.exposure_ms,
             sharp=f"{100 * SHARP:.0f}",
             animal=wanted.animal_m,
         )
