@@ -398,11 +398,6 @@ def level_of(observations: Observations) -> Array:
     return np.where(np.isfinite(observations.level), observations.level, under)
 
 
-def on_level(observations: Observations) -> Observations:
-    """The same observations as they would be without terrain."""
-    return replace(observations, plane_down=level_of(observations), terrain=None, level=None)
-
-
 def shift_from_level(observations: Observations, points: pd.DataFrame) -> Shift:
     """How far points lie from where a level plane would have put them.
 

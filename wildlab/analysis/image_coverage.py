@@ -9,10 +9,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from wildlab.analysis.georeference import observe
+from wildlab.analysis.georeference import observe, truth_of
 from wildlab.errors import WildlabError
 from wildlab.evaluation.streams import Pace
-from wildlab.flight.clocks import between, frame_poses, frame_times, gimbal_angles
+from wildlab.flight.clocks import frame_poses, frame_times, gimbal_angles
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, Mask
@@ -301,21 +301,13 @@ def _untrue(flight: Flight) -> list[Recovered]:
     truth, detections, frames = flight.truth, flight.detections, flight.frames
     if truth is None or detections is None or frames is None or "target_id" not in detections or truth.empty:
         return []
-    at = pd.Index(frames["frame_id"]).get_indexer(pd.Index(detections["frame_id"]))
+    named = detections[detections["target_id"].fillna("") != ""]
+    at = pd.Index(frames["frame_id"]).get_indexer(pd.Index(named["frame_id"]))
     times = np.where(at >= 0, frame_times(flight)[at], np.nan)
-    named = detections["target_id"].fillna("").to_numpy(str)
-    missing = 0
-    for name in np.unique(named[named != ""]):
-        rows = truth[truth["target_id"] == name]
-        own = times[named == name]
-        if rows.empty:
-            missing += len(own)
-            continue
-        stamps = rows["time_s"].to_numpy(float)
-        if np.isnan(stamps).all():
-            continue
-        t, place = ordered(rows, POSITION, stamps + flight.manifest.clocks.truth_offset_s)
-        if len(t):
-            missing += int(np.isnan(between(t, place, own, "truth")[:, 0]).sum())
-    total = int((named != "").sum())
-    return [Recovered("detections_without_truth", missing, total, "detections that name a target", "")]
+    with suppress(WildlabError):  # of a truth whose stamps do not increase nothing is known
+        places = truth_of(flight, named.assign(time_s=times))
+        missing = int(np.isnan(places[:, 0]).sum())
+        return [
+            Recovered("detections_without_truth", missing, len(named), "detections that name a target", "")
+        ]
+    return []
