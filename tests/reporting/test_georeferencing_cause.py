@@ -236,7 +236,9 @@ ADVICE = [
     ({"winner": MOST}, {"calibrated_elsewhere": True}, ["advice-recalibrate"]),
     ({"winner": LITTLE}, {}, []),
     ({"diagnosis": diagnosis(MOST, RIVAL, rivals=(RIVAL,))}, {}, ["advice-vary"]),
-    ({"diagnosis": diagnosis(MOST, outliers=(FAR,))}, {}, ["advice-outlier", "advice-calibrate"]),
+    ({"diagnosis": diagnosis(MOST, outliers=(FAR,))}, {}, ["advice-calibrate", "advice-outlier"]),
+    ({"diagnosis": diagnosis(UNSURE, outliers=(FAR,))}, {}, []),
+    ({"diagnosis": diagnosis(NOTHING, outliers=(FAR,))}, {"problems": 1}, ["advice-contradictions"]),
     ({"diagnosis": None}, {}, ["advice-more-points"]),
     ({"lost": 13}, {"problems": 1}, ["advice-contradictions", "advice-lost"]),
 ]

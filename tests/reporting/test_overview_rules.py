@@ -88,7 +88,7 @@ OUT, CAUSE = gain("far_out", 0.5, ()), gain(share=0.3, causes=("clock",))
 @pytest.mark.parametrize(
     ("found", "keys"),
     [
-        (judged(Verdict.FIX, gains=[OUT, CAUSE]), ["gain-outliers-remedy", "gain-cause-remedy"]),
+        (judged(Verdict.FIX, gains=[OUT, CAUSE]), ["gain-cause-remedy", "gain-outliers-remedy"]),
         # What is far out may be turns under a clock that is wrong.
         (judged(Verdict.MEND, gains=[OUT, CAUSE], problems=1), ["problems-remedy", "gain-cause-remedy"]),
         (judged(Verdict.FIX, gains=[OUT], possible=gain(share=0.2)), []),

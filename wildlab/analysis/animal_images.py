@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from wildlab.analysis.plans.coverage import ExecutionErrors
 from wildlab.geometry.camera import Camera, in_image, normalise
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.frames import Array, Indices, Mask
+from wildlab.geometry.frames import Array, Indices, Mask, euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel, pixel_rays
 from wildlab.geometry.terrain import Terrain, intersect_terrain
 from wildlab.geometry.uncertainty import PoseErrors, ground_covariance
@@ -111,9 +111,8 @@ def pose_errors(errors: ExecutionErrors, sd: float, R_nc: Array, headings: Array
     -------
     PoseErrors
     """
-    cos, sin, zero = np.cos(headings), np.sin(headings), np.zeros(len(headings))
     # Columns: the platform's axes in n, ahead, to the right and down.
-    axes = np.stack([cos, -sin, zero, sin, cos, zero, zero, zero, zero + 1], axis=-1).reshape(-1, 3, 3)
+    axes = euler_to_matrix(0.0, 0.0, headings)
     turned = np.swapaxes(R_nc, -1, -2) @ axes * [errors.roll, errors.pitch, errors.yaw]
     pose = np.zeros((len(headings), 6, 6))
     pose[:, range(3), range(3)] = np.square([errors.horizontal, errors.horizontal, errors.vertical])

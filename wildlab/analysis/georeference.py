@@ -442,13 +442,6 @@ def ground_facts(observations: Observations, points: pd.DataFrame) -> list[Fact]
     if shift.n:
         median, largest = f"{shift.median:.2f}", f"{shift.largest:.2f}"
         found.append(fact("ground-shift", n=shift.n, median=median, largest=largest))
-    kinds = points["ellipse"].value_counts()
-    sampled, split, unbounded = (int(kinds.get(name, 0)) for name in ("sampled", "split", "unbounded"))
-    if sampled + split:
-        key = "ground-split" if split else "ground-sampled"
-        found.append(fact(key, sampled=sampled + split, split=split, placed=placed))
-    if unbounded:
-        found.append(fact("ground-unbounded", unbounded=unbounded, placed=placed))
     return found
 
 

@@ -386,22 +386,18 @@ def paces(flight: Flight) -> dict[str, Pace]:
 
 
 def _path(flight: Flight, source: str | None) -> Path | None:
-    timed = flight.manifest.time.kind == "utc"
+    tables: dict[str, tuple[pd.DataFrame, Array | None]] = {}
     if source is not None:
-        nav = flight.nav[source]
-        t, place = ordered(nav, POSITION)
-        if len(t):
-            return Path(f"nav/{source}", t, place, timed)
+        tables[f"nav/{source}"] = flight.nav[source], None
     if flight.gnss is not None:
-        t, place = ordered(flight.gnss, POSITION, gnss_times(flight))
-        if len(t):
-            return Path("gnss", t, place, timed)
-    truth = flight.truth
-    if truth is not None and len(truth):
-        first = truth[truth["target_id"] == truth["target_id"].iloc[0]]
-        t, place = ordered(first, POSITION)
-        if len(t) > 1:
-            return Path("truth", t + flight.manifest.clocks.truth_offset_s, place, timed)
+        tables["gnss"] = flight.gnss, gnss_times(flight)
+    if flight.truth is not None and flight.truth["time_s"].notna().any():
+        first = flight.truth[flight.truth["target_id"] == flight.truth["target_id"].iloc[0]]
+        tables["truth"] = first, first["time_s"].to_numpy(float) + flight.manifest.clocks.truth_offset_s
+    for who, (table, stamps) in tables.items():
+        t, place = ordered(table, POSITION, stamps)
+        if len(t) > (who == "truth"):
+            return Path(who, t, place, flight.manifest.time.kind == "utc")
     return None
 
 
@@ -432,26 +428,22 @@ def _troubles(
 
 def _series(flight: Flight) -> dict[str, dict[str, tuple[Array, Array]]]:
     height, speed, attitude = {}, {}, {}
-    for name, nav in flight.nav.items():
-        t, place = ordered(nav, POSITION)
+    tables: dict[str, tuple[pd.DataFrame, Array | None]] = {k: (nav, None) for k, nav in flight.nav.items()}
+    if flight.gnss is not None:
+        tables["satellites"] = flight.gnss, gnss_times(flight)
+    for name, (table, stamps) in tables.items():
+        t, place = ordered(table, POSITION, stamps)
         if not len(t):
             continue
         height[name] = t, -place[:, 2]
-        if set(VELOCITY) <= set(nav) and nav[VELOCITY].notna().any().all():
-            at, v = ordered(nav, VELOCITY)
-            speed[name] = at, np.hypot(v[:, 0], v[:, 1])
-        at, q = ordered(nav, QUATERNION)
-        good = np.linalg.norm(q, axis=1) > 0
-        if good.any():
-            attitude[name] = at[good], np.degrees(matrix_to_euler(quaternion_to_matrix(q[good])))
-    if flight.gnss is not None:
-        t, place = ordered(flight.gnss, POSITION, gnss_times(flight))
-        if len(t):
-            height["satellites"] = t, -place[:, 2]
-        if set(VELOCITY) <= set(flight.gnss):
-            t, v = ordered(flight.gnss, VELOCITY, gnss_times(flight))
-            if len(t):
-                speed["satellites"] = t, np.hypot(v[:, 0], v[:, 1])
+        if set(VELOCITY) <= set(table) and table[VELOCITY].notna().any().all():
+            t, v = ordered(table, VELOCITY, stamps)
+            speed[name] = t, np.hypot(v[:, 0], v[:, 1])
+        if set(QUATERNION) <= set(table):
+            t, q = ordered(table, QUATERNION)
+            good = np.linalg.norm(q, axis=1) > 0
+            if good.any():
+                attitude[name] = t[good], np.degrees(matrix_to_euler(quaternion_to_matrix(q[good])))
     return {"height": height, "speed": speed, "attitude": attitude}
 
 

@@ -333,15 +333,16 @@ def advice(found: Accuracy, *, calibrated_elsewhere: bool, problems: int = 0) ->
         said.append(Message("advice-lost"))
     if diagnosis is None:
         return [*said, *([Message("advice-more-points")] if found.summary.n else [])][:MOST_ADVICE]
-    first = next((one for one in diagnosis.outliers if one.kind != "click"), None)
-    if first is not None:
-        name = first.mark if first.kind == "mark" else first.photo
-        values = {"kind": first.kind, "name": str(name), "error": short_length(first.off_m)}
-        said.append(Message("advice-outlier", values))
     if diagnosis.counts and gained_share(diagnosis.winner.gain) >= WORTH:
         said.append(Message("advice-recalibrate" if calibrated_elsewhere else "advice-calibrate"))
     elif diagnosis.rivals and diagnosis.winner.gain.counts and not calibrated_elsewhere:
         said.append(Message("advice-vary"))
+    first = next((one for one in diagnosis.outliers if one.kind != "click"), None)
+    # What is far out may come of what contradicts itself, or of a constant error that is not certain.
+    if first is not None and not problems and not possible_share(found.summary, diagnosis):
+        name = first.mark if first.kind == "mark" else first.photo
+        values = {"kind": first.kind, "name": str(name), "error": short_length(first.off_m)}
+        said.append(Message("advice-outlier", values))
     return said[:MOST_ADVICE]
 
 

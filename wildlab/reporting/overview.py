@@ -34,8 +34,8 @@ from wildlab.analysis.verdict import (
     Numbers,
     Verdict,
     doubted,
-    error_measured,
     evidence_of,
+    number_of,
     possible_gain,
     verdict_of,
 )
@@ -201,7 +201,8 @@ def advice(found: Judged) -> list[Message]:
     said = [Message("problems-remedy")] if found.problems else []
     # What is far out may come of what contradicts itself, or of a constant error that is not certain.
     unsure = found.problems > 0 or found.possible is not None
-    told = (gain_message(gain) for gain in found.gains if not (unsure and gain.key == "far_out"))
+    gains = sorted(found.gains, key=lambda gain: gain.key == "far_out")
+    told = (gain_message(gain) for gain in gains if not (unsure and gain.key == "far_out"))
     said += [Message(f"{one.key}-remedy", one.values) for one in told]
     return said[:MOST]
 
@@ -470,9 +471,8 @@ def show_overview(
     possible = possible_gain(numbers)
     counts = counts_of(overview, gains, problems, judged, possible)
     word = verdict_of(evidence_of(counts, numbers))
-    found = Judged(
-        overview, gains, problems, word, possible, doubted(numbers), judged, error_measured(numbers)
-    )
+    error = number_of(numbers, "horizontal_error_median", "logged-pose")
+    found = Judged(overview, gains, problems, word, possible, doubted(numbers), judged, error)
     report.head(wording.texts.subjects["question"], subtitle(overview))
     wording.summary(answer(found), word, reason(found, counts))
     report.tiles(tiles(overview))

@@ -20,7 +20,7 @@ from wildlab.analysis.plans.request import FURTHEST, simplified
 from wildlab.analysis.plans.sorties import Sortie
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.frames import Array, Indices, Mask, rotation_vector_to_matrix
+from wildlab.geometry.frames import Array, Indices, Mask, euler_to_matrix, rotation_vector_to_matrix
 from wildlab.geometry.georeference import pixel_rays
 from wildlab.geometry.terrain import Terrain, intersect_terrain
 from wildlab.geometry.viewsheds import lines_clear
@@ -407,11 +407,9 @@ def drawn_errors(
 
 def displaced(poses: CameraPoses, headings: ArrayLike, off: Array, turn: Array) -> CameraPoses:
     """The same poses with errors as `drawn_errors` gives them, for platforms with these headings, rad."""
-    h = np.asarray(headings, float)
     # About the platform's axes, given in n.
-    cos, sin = np.cos(h), np.sin(h)
-    axes = [turn[:, 0] * cos - turn[:, 1] * sin, turn[:, 0] * sin + turn[:, 1] * cos, turn[:, 2]]
-    R = rotation_vector_to_matrix(np.stack(axes, axis=-1)) @ poses.R_nc
+    axes = euler_to_matrix(0.0, 0.0, headings) @ turn[..., None]
+    R = rotation_vector_to_matrix(axes[..., 0]) @ poses.R_nc
     return CameraPoses.at_lens(poses.camera, poses.p_nc + off, R, np.eye(3))
 
 

@@ -17,6 +17,7 @@ from scipy.optimize import curve_fit, minimize, nnls
 
 from wildlab.analysis.tracks.noise_model import (
     GROUPS,
+    NOISE_OF,
     Against,
     SensorInputs,
     SensorTuning,
@@ -123,7 +124,7 @@ def _tuned(flight: Flight, sensor: str, reach: float, source: str | None, offset
         )
     sized = np.concatenate([one.sized[np.isfinite(one.error[:, 0])] for one in errors])
     sd = float(np.sqrt(np.mean(sized**2)))
-    alike = len(UNITS_OF[scans.kind]) == 1 and "elevation" not in scans.elements
+    alike = len({NOISE_OF[name] for name in scans.elements}) == 1
     own = () if alike else tuple(np.sqrt(np.mean(known**2, axis=0)).tolist())
     sds = np.array(own) if own else np.full(known.shape[1], float(np.sqrt(np.mean(known**2))))
     # Correlated errors are worth fewer: the sum of squares says less than it seems to.
@@ -158,13 +159,6 @@ def _tuned(flight: Flight, sensor: str, reach: float, source: str | None, offset
         range_bias,
         tilt,
     )
-
-
-#: Units of the elements of a measurement, by kind.
-UNITS_OF = {
-    "position": ("m",), "bearing": ("rad",), "range-bearing": ("m", "rad"), "pixel": ("px",),
-    "velocity": ("m/s",),
-}  # fmt: skip
 
 
 def _errors_of(flight: Flight, scans: Scans, reach: float) -> list[_Errors]:
