@@ -16,7 +16,7 @@ from wildlab.analysis.animal_images import (
     sight_from,
     take_images,
 )
-from wildlab.analysis.plans.coverage import ExecutionErrors, displaced
+from wildlab.analysis.plan_coverage import ExecutionErrors, displaced
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix

@@ -30,7 +30,7 @@ from wildlab.analysis.animal_trackers import (
     patrol,
     track_animals,
 )
-from wildlab.analysis.plans.coverage import ExecutionErrors
+from wildlab.analysis.plan_coverage import ExecutionErrors
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.covariances import gate_threshold

@@ -13,7 +13,7 @@ from click.testing import CliRunner, Result
 
 from tests.analysis.conftest import changed
 from tests.refused import refused
-from wildlab.analysis.camera_clock import (
+from wildlab.analysis.camera import (
     camera_clock_by_motion,
     camera_clock_by_points,
     clock_from_motion,

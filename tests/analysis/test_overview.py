@@ -13,8 +13,7 @@ import pytest
 
 from tests.analysis.building import manifest_of, poses_table, surveyed
 from tests.analysis.conftest import build, receiver, without_poses
-from wildlab.analysis.image_coverage import Recovered, cover_images
-from wildlab.analysis.overview import TROUBLES, look_over
+from wildlab.analysis.overview import TROUBLES, Recovered, cover_images, look_over
 from wildlab.analysis.verdict import (
     gains_of,
     numbers_of,

@@ -10,11 +10,10 @@ import pytest
 from tests.flight.test_area import collection, feature, polygon
 from tests.planning.test_courses import curvature
 from tests.refused import refused
-from wildlab.analysis.plans.coverage import cover
-from wildlab.analysis.plans.plan import make_plan, nearest_ground, refuse_near
-from wildlab.analysis.plans.request import PlanRequest, look
-from wildlab.analysis.plans.result import missions, plan_result
-from wildlab.analysis.plans.sorties import TOLERANCE, fly_rows, follow
+from wildlab.analysis.plan import TOLERANCE, fly_rows, follow, make_plan, nearest_ground, refuse_near
+from wildlab.analysis.plan_coverage import cover
+from wildlab.analysis.plan_request import PlanRequest, look
+from wildlab.analysis.plan_result import missions, plan_result
 from wildlab.flight.writers import CHANGE_SPEED, mission_items
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.terrain import Terrain

@@ -8,9 +8,9 @@ import pytest
 
 from tests.analysis.test_plan import CAMERA, hills, plan
 from tests.flight.test_area import collection, feature, polygon
-from wildlab.analysis.plans.coverage import cover, gimbal_rate, images_of
-from wildlab.analysis.plans.plan import make_plan
-from wildlab.analysis.plans.request import FURTHEST, PlanRequest, simplified
+from wildlab.analysis.plan import make_plan
+from wildlab.analysis.plan_coverage import cover, gimbal_rate, images_of
+from wildlab.analysis.plan_request import FURTHEST, PlanRequest, simplified
 from wildlab.geometry.camera import project
 
 HOLE = [[50, 50], [50, 90], [90, 90], [90, 50], [50, 50]]

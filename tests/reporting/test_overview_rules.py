@@ -17,7 +17,7 @@ from wildlab.reporting import overview as page
 from wildlab.reporting.overview import Judged
 
 TEXTS = load_texts("overview").answers
-#: What may be lost: the keys of `wildlab.analysis.image_coverage.lost_data`.
+#: What may be lost: the keys of `wildlab.analysis.overview.lost_data`.
 LOST = (
     "images_without_pose",
     "images_without_gimbal",

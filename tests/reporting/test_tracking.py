@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wildlab.analysis.tracks.scores import SensorPair, leading_filter
+from wildlab.analysis.tracks.tracker import SensorPair, leading_filter
 from wildlab.evaluation.consistency import Average
 from wildlab.messages.catalogue import load_texts
 from wildlab.reporting import tracking as page

@@ -12,21 +12,17 @@ import pandas as pd
 
 from wildlab.analysis import Fact, fact
 from wildlab.analysis.diagnose import FEWEST_IMAGES, Diagnosis, diagnose
-from wildlab.analysis.evaluate import (
-    axes_of,
-    blocks_of,
-    errors_of,
-    score_points,
-    visible_error,
-)
 from wildlab.analysis.georeference import (
     Observations,
     assumed_deviations,
+    blocks_of,
     calibrated,
     covariances_of,
+    errors_of,
     georeference,
     observe,
     pose_errors,
+    score_points,
 )
 from wildlab.analysis.verdict import FEW_POINTS
 from wildlab.errors import WildlabError
@@ -48,6 +44,7 @@ from wildlab.evaluation.errors import (
     summarise,
 )
 from wildlab.evaluation.intervals import Halves, Labels, compare_halves
+from wildlab.evaluation.outliers import largest_visible
 from wildlab.flight.calibration_files import (
     UNITS,
     Conditions,
@@ -58,11 +55,19 @@ from wildlab.flight.calibration_files import (
     LearntParameter,
     refuse_other_camera,
 )
+from wildlab.flight.clocks import poses_at, truth_at
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.geometry.attitude_uncertainty import tilt_and_heading
 from wildlab.geometry.corrections import Calibration, apply_calibration, calibrated_camera
-from wildlab.geometry.frames import Array, euler_to_matrix, matrix_to_quaternion, quaternion_to_matrix
+from wildlab.geometry.frames import (
+    Array,
+    euler_to_matrix,
+    matrix_to_euler,
+    matrix_to_quaternion,
+    quaternion_to_matrix,
+    wrap,
+)
 
 
 @dataclass(frozen=True)
@@ -268,7 +273,7 @@ def compare_sightings(points: pd.DataFrame) -> pd.DataFrame:
     -------
     DataFrame
         The points that name a thing, with ``truth_id`` (its name), ``error_north_m``, ``error_east_m`` and
-        ``error_m``, as from `wildlab.analysis.evaluate.score_points`; NaN where no other image shows it.
+        ``error_m``, as from `wildlab.analysis.georeference.score_points`; NaN where no other image shows it.
     """
     named = points[points["target_id"].astype(str) != ""].reset_index(drop=True)
     xy, things = named[["north_m", "east_m"]].to_numpy(float), named["target_id"].to_numpy(str)
@@ -571,3 +576,99 @@ def _facts(observations: Observations, learnt: Learnt) -> list[Fact]:
 
 def _range(values: np.ndarray) -> tuple[float, float]:
     return float(np.nanmin(values)), float(np.nanmax(values))
+
+
+#: A camera or a track slower than this has no direction (m/s), and a view nearer to straight down than this
+#: share of its height neither.
+SLOWEST_M_S = 1.0
+STEEPEST = 0.05
+
+
+def axes_of(observations: Observations, scored: pd.DataFrame) -> dict[str, Array]:
+    """Unit vectors (N, 2), north-east, of the axes that a scored table's errors are split along.
+
+    Parameters
+    ----------
+    observations
+        Those that the table was made from.
+    scored
+        From `score_points`, N rows.
+
+    Returns
+    -------
+    dict
+        ``north``, ``east``; ``away from the camera`` and ``to the right of the line of sight``, on the
+        ground; where the poses have times, ``along the course`` and ``to the right of the course``. NaN where
+        a point has no such axis.
+    """
+    rows = pd.Index(observations.table["detection_id"]).get_indexer(pd.Index(scored["detection_id"]))
+    camera = observations.poses.p_nc[rows]
+    sight = scored[["north_m", "east_m"]].to_numpy(float) - camera[:, :2]
+    drop = observations.plane_down[rows] - camera[:, 2]
+    away = _unit(sight, STEEPEST * np.abs(drop))
+    one = np.ones(len(scored))
+    axes = {
+        "north": np.column_stack([one, 0 * one]),
+        "east": np.column_stack([0 * one, one]),
+        "away from the camera": away,
+        "to the right of the line of sight": _right(away),
+    }
+    flight = observations.flight
+    nav = flight.nav[observations.source]
+    if flight.manifest.time.kind == "utc" and "frame_id" not in nav:
+        times = scored["time_s"].to_numpy(float)
+        after, before = (poses_at(nav, times + shift)[0][:, :2] for shift in (0.5, -0.5))
+        track = _unit(after - before, np.full(len(times), SLOWEST_M_S))
+        if np.isfinite(track).any():
+            axes |= {"along the course": track, "to the right of the course": _right(track)}
+    return axes
+
+
+def _unit(vectors: Array, least: Array) -> Array:
+    length = np.hypot(*vectors.T)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.where((length > least)[:, None], vectors / length[:, None], np.nan)
+
+
+def _right(axis: Array) -> Array:
+    """A quarter turn clockwise, seen from above (north, east)."""
+    return np.column_stack([-axis[:, 1], axis[:, 0]])
+
+
+#: How far headings may lie from their mean, rad, for a flight on one heading: a turned camera and a shifted
+#: position then move all points alike.
+ONE_HEADING = np.radians(45.0)
+
+
+def on_one_heading(observations: Observations) -> bool:
+    """Whether all images were taken on one heading.
+
+    Parameters
+    ----------
+    observations
+        From `wildlab.analysis.georeference.observe`.
+
+    Returns
+    -------
+    bool
+    """
+    R = observations.poses.R_nb[np.isfinite(observations.poses.R_nb).all(axis=(1, 2))]
+    yaw = matrix_to_euler(R)[:, 2]
+    mean = np.angle(np.exp(1j * yaw).mean()) if len(yaw) else 0.0
+    return bool(len(yaw)) and bool(np.abs(wrap(yaw - mean)).max() <= ONE_HEADING)
+
+
+def visible_error(flight: Flight, scored: pd.DataFrame) -> float:
+    """Half the median spacing of the marks, m: larger errors go to another one, where the nearest counts.
+
+    Parameters
+    ----------
+    flight
+        With truth.
+    scored
+        From `score_points`.
+    """
+    offset = flight.manifest.clocks.truth_offset_s
+    _, places = truth_at(flight.table("truth"), scored["time_s"].to_numpy(float), offset_s=offset)
+    spots = np.nanmedian(places[:, :, :2], axis=1)
+    return largest_visible(spots[np.isfinite(spots).all(axis=1)])

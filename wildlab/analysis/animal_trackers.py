@@ -24,7 +24,7 @@ from wildlab.analysis.animal_images import (
     sight_from,
     take_images,
 )
-from wildlab.analysis.plans.coverage import ExecutionErrors, displaced, drawn_errors
+from wildlab.analysis.plan_coverage import ExecutionErrors, displaced, drawn_errors
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.covariances import gate_threshold
 from wildlab.geometry.frames import Array, Indices, Mask

@@ -1,4 +1,6 @@
-"""A flight's detections as points on the ground, each with its covariance, and as files for maps."""
+"""A flight's detections as points on the ground, each with its covariance, as files for maps, and against
+surveyed truth.
+"""
 
 from __future__ import annotations
 
@@ -14,14 +16,15 @@ import pandas as pd
 
 from wildlab.analysis import Fact, fact
 from wildlab.errors import WildlabError
+from wildlab.evaluation.intervals import time_blocks
 from wildlab.files import write_atomic, write_csv
 from wildlab.flight.clocks import between, frame_times, gimbal_angles, pose_finder, poses_at, truth_at
 from wildlab.flight.store import Flight
 from wildlab.geometry.attitude_uncertainty import pose_covariance
 from wildlab.geometry.calibration import Calibration, PosesAt, calibrated_poses
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.covariances import ellipse_axes
-from wildlab.geometry.frames import Array, Mask, ned_to_geodetic
+from wildlab.geometry.covariances import ellipse_axes, inside_ellipse
+from wildlab.geometry.frames import Array, Indices, Mask, ned_to_geodetic
 from wildlab.geometry.georeference import RAY_STATUS, georeference_pixels
 from wildlab.geometry.terrain import Terrain, pixels_to_terrain
 from wildlab.geometry.uncertainty import PoseErrors, ground_covariance, terrain_covariance
@@ -574,3 +577,152 @@ def _rings(placed: pd.DataFrame) -> Array:
     east = along * np.sin(bearing) + across * np.cos(bearing)
     middle = placed[["north_m", "east_m", "down_m"]].to_numpy(float)[:, None, :]
     return middle + np.stack([north, east, np.zeros_like(north)], axis=2)
+
+
+def score_points(flight: Flight, points: pd.DataFrame) -> pd.DataFrame:
+    """Errors of ground points against the truth, by the flight's scoring rule.
+
+    ``labelled``: the target that the detection names; points without one are left out. ``nearest``: the
+    target nearest to the point, horizontally, among those whose position is known at that time.
+
+    Parameters
+    ----------
+    flight
+        With truth.
+    points
+        From `wildlab.analysis.georeference.georeference`.
+
+    Returns
+    -------
+    DataFrame
+        The points that can be judged, with ``truth_id``, ``error_north_m``, ``error_east_m``, ``error_m``
+        (NaN where the ray missed the ground) and ``inside_90`` (whether the truth lies in the 90 % ellipse;
+        NaN where there is no ellipse).
+
+    Raises
+    ------
+    WildlabError
+        Where the flight has no truth, or none of its points can be judged.
+
+    Examples
+    --------
+    >>> from wildlab.analysis.georeference import georeference, observe
+    >>> from wildlab.simulation.twins import simulate_twin
+    >>> flight = simulate_twin("large-ship", 1)
+    >>> points = georeference(observe(flight, "truth"), np.random.default_rng(0))
+    >>> bool(score_points(flight, points)["error_m"].median() < 20)
+    True
+    """
+    truth = flight.table("truth")
+    xy = points[["north_m", "east_m"]].to_numpy(float)
+    if flight.manifest.scoring.rule == "labelled":
+        where, names = truth_of(flight, points), points["target_id"].to_numpy(str)
+    else:
+        offset = flight.manifest.clocks.truth_offset_s
+        targets, positions = truth_at(truth, points["time_s"].to_numpy(float), offset_s=offset)
+        distance = np.linalg.norm(positions[:, :, :2] - xy, axis=2)
+        nearest = np.where(np.isnan(distance), np.inf, distance).argmin(axis=0)
+        where, names = positions[nearest, np.arange(len(points))], np.asarray(targets)[nearest]
+    known = np.isfinite(where[:, :2]).all(axis=1)
+    if not known.any():
+        raise WildlabError(
+            "no detection can be compared with the truth",
+            "name the targets in the detections' target_id, or set the scoring rule to 'nearest'",
+            file=flight.folder,
+            field="detections.target_id",
+        )
+    error = (xy - where[:, :2])[known]
+    scored = points.iloc[np.flatnonzero(known)]
+    covariance = covariances_of(scored)
+    inside = inside_ellipse(error, covariance).astype(float)
+    inside[~np.isfinite(covariance).all(axis=(1, 2))] = np.nan
+    scored = scored.assign(
+        truth_id=names[known],
+        error_north_m=error[:, 0],
+        error_east_m=error[:, 1],
+        error_m=np.hypot(*error.T),
+        inside_90=inside,
+    )
+    return scored.reset_index(drop=True)
+
+
+def errors_of(scored: pd.DataFrame) -> Array:
+    """The errors (N, 2) north-east of a scored table.
+
+    Parameters
+    ----------
+    scored
+        From `score_points`.
+
+    Returns
+    -------
+    (N, 2) m, point minus truth
+
+    Examples
+    --------
+    >>> errors_of(pd.DataFrame({"error_north_m": [1.0], "error_east_m": [2.0]})).tolist()
+    [[1.0, 2.0]]
+    """
+    return scored[["error_north_m", "error_east_m"]].to_numpy(float)
+
+
+def recorded_answers(flight: Flight) -> tuple[dict[str, pd.DataFrame], list[str]]:
+    """Positions that other programs gave for the same detections, scored like ours.
+
+    Parameters
+    ----------
+    flight
+        With detections of the kind ``position``, and truth.
+
+    Returns
+    -------
+    answers, unlabelled
+        Scored tables by program; and the programs that name no target with a truth where they have to.
+    """
+    detections, frames = flight.table("detections"), flight.table("frames")
+    answers, unlabelled = dict[str, pd.DataFrame](), list[str]()
+    for program, rows in detections[detections["kind"] == "position"].groupby("source", sort=False):
+        names = rows["target_id"].fillna("") if "target_id" in rows else pd.Series("", rows.index)
+        known = names.isin(set(flight.table("truth")["target_id"]))
+        if flight.manifest.scoring.rule == "labelled" and not known.any():
+            unlabelled.append(str(program))
+            continue
+        at = pd.Index(frames["frame_id"]).get_indexer(pd.Index(rows["frame_id"]))
+        points = rows[["detection_id", "frame_id", "north_m", "east_m"]].assign(
+            target_id=names, time_s=frames["time_s"].to_numpy(float)[at],
+            cov_nn=np.nan, cov_ne=np.nan, cov_ee=np.nan,
+        )  # fmt: skip
+        answers[str(program)] = score_points(flight, points.reset_index(drop=True))
+    return answers, unlabelled
+
+
+def blocks_of(flight: Flight, table: pd.DataFrame) -> Indices:
+    """Which block in time order (N,) each point belongs to: see `wildlab.evaluation.intervals.time_blocks`.
+
+    Parameters
+    ----------
+    flight
+        Says whether its times are times, or merely number the images.
+    table
+        With ``frame_id`` and ``time_s``, N rows.
+
+    Returns
+    -------
+    (N,) integers from 0
+    """
+    times = table["time_s"].to_numpy(float)
+    if flight.manifest.time.kind == "utc" and np.isfinite(times).all():
+        return time_blocks(times, seconds=True)
+    place = pd.Index(flight.table("frames")["frame_id"]).get_indexer(pd.Index(table["frame_id"]))
+    return time_blocks(place, seconds=False)
+
+
+def known_points(observations: Observations, scored: pd.DataFrame) -> tuple[Observations, Array]:
+    """The observations that were scored, and the points (N, 3) they should have met.
+
+    North and east are those of the truth, down is the ground that the ray was cut with.
+    """
+    chosen = observations.of(scored)
+    names = scored.set_index("detection_id").loc[chosen.table["detection_id"], "truth_id"].to_numpy()
+    where = truth_of(chosen.flight, chosen.table.assign(target_id=names))
+    return chosen, np.column_stack([where[:, :2], chosen.plane_down])

@@ -188,7 +188,7 @@ class Gain(NamedTuple):
     Attributes
     ----------
     key
-        ``cause``, ``far_out``, or what is lost: `wildlab.analysis.image_coverage.Recovered`.
+        ``cause``, ``far_out``, or what is lost: `wildlab.analysis.overview.Recovered`.
     causes
         Of a constant error, which; else empty.
     value, of

@@ -14,7 +14,7 @@ from wildlab.errors import WildlabError
 from wildlab.terminal import print_json, print_table, shown, stopped
 
 if TYPE_CHECKING:
-    from wildlab.analysis.camera_clock import CameraClock
+    from wildlab.analysis.camera import CameraClock
     from wildlab.flight.store import Flight
 
 LENGTHS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
@@ -218,7 +218,7 @@ def clock(
 
 def _estimate(flight: Flight, images: Path | None, source: str | None) -> CameraClock:
     from wildlab.analysis import fact
-    from wildlab.analysis.camera_clock import clock_from_motion, clock_from_points
+    from wildlab.analysis.camera import clock_from_motion, clock_from_points
 
     if images is None:
         return clock_from_points(flight, source)

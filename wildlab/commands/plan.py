@@ -86,8 +86,8 @@ def plan(
       wildlab plan fence.geojson --camera camera.toml --terrain dem.tif --animals 5 --out flight
       wildlab plan fence.kml --camera camera.toml --turn-radius 40 --wind 6 --wind-from 270 --out flight
     """
-    from wildlab.analysis.plans.request import PlanRequest
-    from wildlab.analysis.plans.result import PAGE, RESULT, plan_flight
+    from wildlab.analysis.plan_request import PlanRequest
+    from wildlab.analysis.plan_result import PAGE, RESULT, plan_flight
     from wildlab.files import write_atomic, write_json
 
     stated = {name: asked.pop(name) for name in list(asked) if name.startswith("terrain_")}

@@ -15,9 +15,9 @@ import numpy as np
 import pandas as pd
 
 from wildlab.analysis import Fact
-from wildlab.analysis.accuracy import Accuracy, Repeats
+from wildlab.analysis.accuracy import Accuracy, Repeats, on_one_heading
 from wildlab.analysis.diagnose import CAUSES, Diagnosis
-from wildlab.analysis.evaluate import errors_of, on_one_heading
+from wildlab.analysis.georeference import errors_of
 from wildlab.analysis.verdict import (
     FEW_POINTS,
     MANY_LOST,
@@ -172,7 +172,7 @@ def truth_kinds(flight: Flight, scored: pd.DataFrame) -> TruthKinds:
     flight
         With truth.
     scored
-        From `wildlab.analysis.evaluate.score_points`, of it.
+        From `wildlab.analysis.georeference.score_points`, of it.
     """
     if flight.manifest.kind == "twin":
         return EXACT

@@ -9,8 +9,7 @@ import pandas as pd
 
 from wildlab.analysis.accuracy import Accuracy
 from wildlab.analysis.diagnose import Diagnosis
-from wildlab.analysis.evaluate import errors_of
-from wildlab.analysis.georeference import Observations, shift_from_level
+from wildlab.analysis.georeference import Observations, errors_of, shift_from_level
 from wildlab.evaluation.correlated_errors import WanderNoise
 from wildlab.evaluation.errors import AlongAxis, ErrorSummary, summarise
 from wildlab.evaluation.outliers import Outlier

@@ -1,6 +1,6 @@
 """The page on a flight's tracks: how wrong they are, and whether their filters know.
 
-What the page says follows by rules from `wildlab.analysis.tracks.scores.score_tracks`; the words lie in
+What the page says follows by rules from `wildlab.analysis.tracks.tracker.score_tracks`; the words lie in
 ``data/messages/en/tracking.toml``.
 """
 
@@ -12,7 +12,8 @@ import numpy as np
 import pandas as pd
 
 from wildlab.analysis.tracks.noise_model import HERE, GivenValue, Tuned
-from wildlab.analysis.tracks.scores import (
+from wildlab.analysis.tracks.single_target import TOGETHER
+from wildlab.analysis.tracks.tracker import (
     CAUTIOUS,
     CONSISTENT,
     FEW_INDEPENDENT,
@@ -21,12 +22,11 @@ from wildlab.analysis.tracks.scores import (
     OVERCONFIDENT,
     UNKNOWN,
     SensorPair,
+    TrackingResult,
     is_at_rest,
     leading_filter,
     verdict,
 )
-from wildlab.analysis.tracks.single_target import TOGETHER
-from wildlab.analysis.tracks.tracker import TrackingResult
 from wildlab.analysis.verdict import VERDICT_LEVEL, Evidence, Verdict, verdict_of
 from wildlab.flight.store import Flight
 from wildlab.messages.catalogue import Message, load_texts
@@ -167,9 +167,9 @@ def judge_tracks(rows: pd.DataFrame, pairs: Sequence[SensorPair]) -> Verdict:
     Parameters
     ----------
     rows
-        From `wildlab.analysis.tracks.scores.score_tracks`.
+        From `wildlab.analysis.tracks.tracker.score_tracks`.
     pairs
-        From `wildlab.analysis.tracks.scores.compare_sensors`.
+        From `wildlab.analysis.tracks.tracker.compare_sensors`.
 
     Returns
     -------
@@ -432,7 +432,7 @@ def show_tracks(
     flight, followed
         The flight, and its tracks.
     rows, pairs
-        From `wildlab.analysis.tracks.scores`: a row a track, and sensors beside each other.
+        From `wildlab.analysis.tracks.tracker`: a row a track, and sensors beside each other.
     tuned
         What another flight taught.
     source

@@ -15,9 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wildlab.analysis.plans.plan import Plan
-from wildlab.analysis.plans.request import FURTHEST, simplified
-from wildlab.analysis.plans.sorties import Sortie
+from wildlab.analysis.plan import Plan, Sortie
+from wildlab.analysis.plan_request import FURTHEST, simplified
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, Indices, Mask, euler_to_matrix, rotation_vector_to_matrix
@@ -97,7 +96,7 @@ def cover(plan: Plan, tell: Callable[[int, int], None] = lambda done, of: None) 
     Parameters
     ----------
     plan
-        From `wildlab.analysis.plans.plan.make_plan`.
+        From `wildlab.analysis.plan.make_plan`.
     tell
         Called with how many areas are done, of how many.
 
@@ -131,7 +130,7 @@ def images_of(plan: Plan, sortie: Sortie) -> Images:
     Parameters
     ----------
     plan
-        From `wildlab.analysis.plans.plan.make_plan`.
+        From `wildlab.analysis.plan.make_plan`.
     sortie
         One of its flights.
 

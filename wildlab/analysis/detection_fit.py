@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.analysis.detecting.detect import METHODS, detect_frame
-from wildlab.analysis.detecting.scores import ELLIPSE, plain_interval
+from wildlab.analysis.detection_scores import ELLIPSE, plain_interval
+from wildlab.analysis.detectors import METHODS, detect_frame
 from wildlab.detection.contrast import PERMISSIVE, Contrast, Proposals, Shape, choose, fit_shape, propose
 from wildlab.detection.detections import Detections
 from wildlab.detection.floating import FloatingThresholds
@@ -358,7 +358,7 @@ def candidates(method: str, count: int = TRIED, seed: int = 1) -> list[Any]:
     Parameters
     ----------
     method
-        One of `wildlab.analysis.detecting.detect.METHODS`.
+        One of `wildlab.analysis.detectors.METHODS`.
     count
         How many at most.
     seed

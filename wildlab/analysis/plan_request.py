@@ -152,7 +152,7 @@ def look(camera: Camera, tilt_deg: float, gimbal: str = "fixed", swing_deg: floa
     tilt_deg
         Below the horizon; 90 is straight down.
     gimbal, swing_deg
-        As for `wildlab.analysis.plans.request.PlanRequest`.
+        As for `wildlab.analysis.plan_request.PlanRequest`.
 
     Returns
     -------
