@@ -8,10 +8,10 @@ import cv2
 import numpy as np
 import pandas as pd
 import pytest
-from wildlab.analysis.detecting import detect as subject
 
 from tests.analysis.test_detection_part_fit import sample
 from tests.refused import refused
+from wildlab.analysis import detectors as subject
 from wildlab.analysis.detection_command import samples_of
 from wildlab.analysis.detection_fit import fit_shapes, fit_thresholds
 from wildlab.analysis.detection_scores import judge_detections

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -43,7 +43,7 @@ from wildlab.evaluation.errors import (
     split_along,
     summarise,
 )
-from wildlab.evaluation.intervals import Halves, Labels, compare_halves
+from wildlab.evaluation.intervals import Halves, compare_halves
 from wildlab.evaluation.outliers import largest_visible
 from wildlab.flight.calibration_files import (
     UNITS,
@@ -78,8 +78,6 @@ class Accuracy:
     ----------
     observations, points, scored
         What was put on the ground, where, and against the truth: N rows, lost points among them.
-    blocks
-        (N,) in time order.
     summary, intervals
         Of the errors as they are, and low and high of its figures by name (these images, resampled); none
         below six images.
@@ -96,8 +94,6 @@ class Accuracy:
     remaining
         What the errors are made of once the cause is taken off, or as they are where no cause gained anything
         for certain; without what is far out.
-    noise
-        How noisy the poses were; without what is far out.
     visible_m
         Where each point is held against the nearest mark: larger errors go to another one; else NaN.
     """
@@ -105,7 +101,6 @@ class Accuracy:
     observations: Observations
     points: pd.DataFrame
     scored: pd.DataFrame
-    blocks: Labels
     summary: ErrorSummary
     intervals: dict[str, tuple[float, float]]
     lost: int
@@ -115,7 +110,6 @@ class Accuracy:
     halves: Halves
     diagnosis: Diagnosis | None
     remaining: Scatter
-    noise: WanderNoise | None
     visible_m: float
 
     @property
@@ -180,7 +174,6 @@ def judge_accuracy(
         observations=observations,
         points=points,
         scored=scored,
-        blocks=blocks,
         summary=summary,
         intervals=intervals,
         lost=int((~np.isfinite(scored["error_m"])).sum()),
@@ -190,7 +183,6 @@ def judge_accuracy(
         halves=compare_halves(scored["error_m"].to_numpy(float), blocks),
         diagnosis=diagnosis,
         remaining=scatter_by_image(left, of["frame_id"]),
-        noise=None if diagnosis is None else diagnosis.noise,
         visible_m=visible_error(flight, scored) if by_nearest else np.nan,
     )
 
@@ -378,6 +370,16 @@ def learn_flight(
     return learn_from(observations, diagnosis), diagnosis
 
 
+def corrections(calibration: Calibration) -> list[dict[str, Any]]:
+    """``name``, ``value``, ``low``, ``high`` (95 %) and ``unit`` of each parameter, as a file has it."""
+    rows = []
+    for name in calibration.names:
+        scale, ends = _SCALES.get(UNITS[name], 1.0), calibration.interval(name)
+        value, low, high = (scale * one for one in (calibration.value(name), *ends))
+        rows.append({"name": name, "value": value, "low": low, "high": high, "unit": UNITS[name]})
+    return rows
+
+
 def learn_from(observations: Observations, diagnosis: Diagnosis) -> Learnt:
     """What a diagnosis teaches: corrections only where they gained something for certain.
 
@@ -400,17 +402,8 @@ def learn_from(observations: Observations, diagnosis: Diagnosis) -> Learnt:
     depression = np.degrees(np.arcsin(np.clip(used.poses.R_nc[:, 2, 2], -1, 1)))
     height = used.plane_down - used.poses.p_nc[:, 2]
     calibration, gain = diagnosis.calibration, diagnosis.winner.gain
-    parameters, scales = [], []
-    for one in calibration.names if diagnosis.counts else ():
-        unit = UNITS[one]
-        scale = _SCALES.get(unit, 1.0)
-        low, high = calibration.interval(one)
-        parameters.append(
-            LearntParameter(
-                name=one, value=scale * calibration.value(one), low=scale * low, high=scale * high, unit=unit
-            )
-        )
-        scales.append(scale)
+    told = corrections(calibration) if diagnosis.counts else []
+    scales = [_SCALES.get(one["unit"], 1.0) for one in told]
     covariance = calibration.covariance * np.outer(scales, scales) if scales else np.zeros((0, 0))
     return Learnt(
         learnt_on=LearntOn(
@@ -435,7 +428,7 @@ def learn_from(observations: Observations, diagnosis: Diagnosis) -> Learnt:
         if diagnosis.counts
         else None,
         covariance=tuple(tuple(map(float, row)) for row in covariance),
-        parameter=tuple(parameters),
+        parameter=tuple(LearntParameter(**one) for one in told),
     )
 
 

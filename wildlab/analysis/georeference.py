@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -62,8 +61,6 @@ class Observations:
         point where the ray meets it.
     terrain
         The flight's, where it has one.
-    level
-        Over terrain, what `plane_down` would be without it, (N,).
     """
 
     flight: Flight
@@ -73,7 +70,6 @@ class Observations:
     poses: CameraPoses
     plane_down: Array
     terrain: Terrain | None = None
-    level: Array | None = None
 
     def take(self, rows: Mask) -> Observations:
         """The observations of some rows."""
@@ -83,7 +79,6 @@ class Observations:
             uv=self.uv[rows],
             poses=self.poses.take(rows),
             plane_down=self.plane_down[rows],
-            level=None if self.level is None else self.level[rows],
         )
 
     def of(self, scored: pd.DataFrame) -> Observations:
@@ -164,16 +159,14 @@ def observe(
     )
     manifest = flight.manifest
     mount = manifest.geometry_mount(name)
-    level = _ground_heights(flight, table, pixels)
     seen = Observations(
         flight,
         name,
         table,
         pixels[["u_px", "v_px"]].to_numpy(float),
         CameraPoses(manifest.geometry_camera(), mount, p_nb, R_nb, pan, tilt, covariance),
-        level,
+        _ground_heights(flight, table, pixels),
         flight.terrain,
-        None if flight.terrain is None else level,
     )
     return _grounded(seen)
 
@@ -351,21 +344,12 @@ def truth_of(flight: Flight, table: pd.DataFrame) -> Array:
     -------
     (N, 3) m
     """
-    where = np.full((len(table), 3), np.nan)
-    if flight.truth is None:
-        return where
-    names = table["target_id"].to_numpy(object)
-    times = table["time_s"].to_numpy(float)
-    still = flight.truth[flight.truth["time_s"].isna()].drop_duplicates("target_id")
-    at = pd.Index(still["target_id"]).get_indexer(pd.Index(names))
-    where[at >= 0] = still[["north_m", "east_m", "down_m"]].to_numpy(float)[at[at >= 0]]
-    moving = flight.truth[flight.truth["time_s"].notna()]
-    tracks = dict(tuple(moving.groupby("target_id", sort=False)))
-    offset = flight.manifest.clocks.truth_offset_s
-    for target in set(names) & tracks.keys():
-        rows = names == target
-        where[rows] = truth_at(tracks[target], times[rows], offset_s=offset)[1][0]
-    return where
+    if flight.truth is None or flight.truth.empty:
+        return np.full((len(table), 3), np.nan)
+    times, offset = table["time_s"].to_numpy(float), flight.manifest.clocks.truth_offset_s
+    targets, where = truth_at(flight.truth, times, offset)
+    at = pd.Index(targets).get_indexer(pd.Index(table["target_id"]))
+    return np.where((at >= 0)[:, None], where[at, np.arange(len(at))], np.nan)
 
 
 def _ground_heights(flight: Flight, table: pd.DataFrame, pixels: pd.DataFrame) -> Array:
@@ -375,61 +359,13 @@ def _ground_heights(flight: Flight, table: pd.DataFrame, pixels: pd.DataFrame) -
     return np.where(np.isnan(of_target), pixels["plane_down_m"].to_numpy(float), of_target)
 
 
-class Shift(NamedTuple):
-    """How far points on terrain lie from those on a level plane, metres, horizontally.
-
-    Attributes
-    ----------
-    n
-        How many points are on both.
-    median, largest
-        Of the distances; NaN where there is none.
-    """
-
-    n: int
-    median: float
-    largest: float
-
-
-def level_of(observations: Observations) -> Array:
-    """Down coordinate (N,) of the plane that would serve without terrain: as stated, else under the lens."""
-    ground: Terrain | None = observations.terrain
-    if ground is None or observations.level is None:
-        return observations.plane_down
-    p_nc = np.broadcast_to(observations.poses.p_nc, (len(observations.uv), 3))
-    under = -ground.heights_at(p_nc[:, :2])
-    return np.where(np.isfinite(observations.level), observations.level, under)
-
-
-def shift_from_level(observations: Observations, points: pd.DataFrame) -> Shift:
-    """How far points lie from where a level plane would have put them.
-
-    Parameters
-    ----------
-    observations
-        Of a flight with terrain.
-    points
-        From `wildlab.analysis.georeference.georeference`, of these.
-
-    Returns
-    -------
-    Shift
-    """
-    level = georeference_pixels(observations.poses, observations.uv, level_of(observations))[:, :2]
-    off = np.linalg.norm(points[["north_m", "east_m"]].to_numpy(float) - level, axis=1)
-    off = off[np.isfinite(off)]
-    if not len(off):
-        return Shift(0, float("nan"), float("nan"))
-    return Shift(len(off), float(np.median(off)), float(off.max()))
-
-
 def ground_facts(observations: Observations, points: pd.DataFrame) -> list[Fact]:
-    """What the points lie on, what became of the rays, and what a plane would have given.
+    """What the points lie on, and what became of the rays.
 
     Parameters
     ----------
     observations, points
-        As for `shift_from_level`; without terrain there is less to say.
+        What was put on the ground, and where it lies.
 
     Returns
     -------
@@ -440,12 +376,7 @@ def ground_facts(observations: Observations, points: pd.DataFrame) -> list[Fact]
     if observations.terrain is None:
         return [fact("ground-level", placed=placed, of=of)]
     became = "; ".join(f"{n} {words}" for words, n in points["ray"].value_counts().items())
-    found = [fact("ground-terrain", of=of, became=became or "none")]
-    shift = shift_from_level(observations, points)
-    if shift.n:
-        median, largest = f"{shift.median:.2f}", f"{shift.largest:.2f}"
-        found.append(fact("ground-shift", n=shift.n, median=median, largest=largest))
-    return found
+    return [fact("ground-terrain", of=of, became=became or "none")]
 
 
 #: What is written, by the end of the name.

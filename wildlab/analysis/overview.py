@@ -187,19 +187,37 @@ def _closed(outlines: Array) -> Array:
 POSITION = ["north_m", "east_m", "down_m"]
 
 
-class Recovered(NamedTuple):
-    """Data that are lost: ``lost`` of ``of``, what they are, and why they are lost."""
+class Gain(NamedTuple):
+    """One thing to fix.
+
+    Attributes
+    ----------
+    key
+        ``cause``, ``far_out``, or what is lost: `lost_data`.
+    causes
+        Of a constant error, which; else empty.
+    value, of
+        What is gained, metres or how many, and of how many metres, or of how many.
+    share
+        Of the error or of the data.
+    what
+        What is lost.
+    why
+        What is known of the reason, as a clause; may be empty.
+    """
 
     key: str
-    lost: int
-    of: int
-    what: str
-    why: str
+    causes: tuple[str, ...]
+    value: float
+    of: float
+    share: float
+    what: str = ""
+    why: str = ""
 
-    @property
-    def share(self) -> float:
-        """Of all."""
-        return self.lost / self.of if self.of else 0.0
+
+def _lost(key: str, count: int, of: int, what: str, why: str = "") -> Gain:
+    """Data that are lost: so many of so many, what they are, and why they are lost."""
+    return Gain(key, (), count, of, count / of if of else 0.0, what, why)
 
 
 def ordered(table: pd.DataFrame, columns: list[str], stamps: Array | None = None) -> tuple[Array, Array]:
@@ -238,7 +256,7 @@ def _placed(flight: Flight, source: str | None) -> tuple[Mask, Mask]:
     return np.asarray(np.isfinite(points).all(axis=1)), np.asarray(posed)
 
 
-def lost_data(flight: Flight, source: str | None, streams: dict[str, Pace]) -> list[Recovered]:
+def lost_data(flight: Flight, source: str | None, streams: dict[str, Pace]) -> list[Gain]:
     """What is lost, with its denominator: images, detections, seconds."""
     found = []
     frames, timed = flight.frames, flight.manifest.time.kind == "utc"
@@ -248,22 +266,22 @@ def lost_data(flight: Flight, source: str | None, streams: dict[str, Pace]) -> l
             p, angles = frame_poses(flight, source)[0], gimbal_angles(flight)
             posed, turned = np.asarray(np.isfinite(p).all(axis=1)), np.isfinite(np.sum(angles, axis=0))
         why = _why_unposed(flight, source, ~posed) if timed and (~posed).any() else ""
-        found.append(Recovered("images_without_pose", int((~posed).sum()), len(frames), "images", why))
+        found.append(_lost("images_without_pose", int((~posed).sum()), len(frames), "images", why))
         missing = int((posed & ~turned).sum())
-        found.append(Recovered("images_without_gimbal", missing, len(frames), "images", ""))
+        found.append(_lost("images_without_gimbal", missing, len(frames), "images"))
         placed, has_pose = _placed(flight, source)
         away = int((has_pose & ~placed).sum())
-        found.append(Recovered("detections_off_ground", away, len(placed), "detections", ""))
+        found.append(_lost("detections_off_ground", away, len(placed), "detections"))
     if timed:
         found += _unrecorded(flight, source, streams)
     imu = streams.get("imu")
     if timed and imu is not None and imu.missing:
-        found.append(Recovered("inertial_samples", imu.missing, imu.n + imu.missing, "inertial samples", ""))
+        found.append(_lost("inertial_samples", imu.missing, imu.n + imu.missing, "inertial samples"))
     found += _untrue(flight)
-    return [one for one in found if one.lost]
+    return [one for one in found if one.value]
 
 
-def _unrecorded(flight: Flight, source: str | None, streams: dict[str, Pace]) -> list[Recovered]:
+def _unrecorded(flight: Flight, source: str | None, streams: dict[str, Pace]) -> list[Gain]:
     """Seconds of the record without poses, satellite positions or inertial samples, and when these are."""
     carried = [pace for name, pace in streams.items() if pace.n and name != "truth"]
     if not carried:
@@ -284,7 +302,7 @@ def _unrecorded(flight: Flight, source: str | None, streams: dict[str, Pace]) ->
             *([f"{pace.paused_s:.0f} in its pauses"] if round(pace.paused_s) else []),
         ]
         what = "seconds of the record"
-        found.append(Recovered(key, lost, max(1, round(end - begin)), what, " and ".join(said)))
+        found.append(_lost(key, lost, max(1, round(end - begin)), what, " and ".join(said)))
     return found
 
 
@@ -302,7 +320,7 @@ def _why_unposed(flight: Flight, source: str, unposed: Mask) -> str:
     return " and ".join(said)
 
 
-def _untrue(flight: Flight) -> list[Recovered]:
+def _untrue(flight: Flight) -> list[Gain]:
     """Detections that name a target whose truth is not known at the time."""
     truth, detections, frames = flight.truth, flight.detections, flight.frames
     if truth is None or detections is None or frames is None or "target_id" not in detections or truth.empty:
@@ -313,9 +331,7 @@ def _untrue(flight: Flight) -> list[Recovered]:
     with suppress(WildlabError):  # of a truth whose stamps do not increase nothing is known
         places = truth_of(flight, named.assign(time_s=times))
         missing = int(np.isnan(places[:, 0]).sum())
-        return [
-            Recovered("detections_without_truth", missing, len(named), "detections that name a target", "")
-        ]
+        return [_lost("detections_without_truth", missing, len(named), "detections that name a target")]
     return []
 
 
@@ -569,7 +585,7 @@ class Overview:
     vibration: tuple[Array, Array] | None
     coverage: Coverage | None
     detections: tuple[int, int, int]
-    lost: tuple[Recovered, ...]
+    lost: tuple[Gain, ...]
     uses: tuple[Use, ...]
     problems: tuple[Finding, ...]
 

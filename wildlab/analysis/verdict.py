@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from enum import StrEnum
 from typing import Any, NamedTuple
 
-from wildlab.analysis.overview import Overview
+from wildlab.analysis.overview import Gain, Overview
 from wildlab.evaluation.ellipses import is_conservative, is_overconfident
 from wildlab.evaluation.intervals import Interval
 
@@ -182,34 +182,6 @@ CAUSES = {
 }
 
 
-class Gain(NamedTuple):
-    """One thing to fix.
-
-    Attributes
-    ----------
-    key
-        ``cause``, ``far_out``, or what is lost: `wildlab.analysis.overview.Recovered`.
-    causes
-        Of a constant error, which; else empty.
-    value, of
-        What is gained, metres or how many, and of how many metres, or of how many.
-    share
-        Of the error or of the data.
-    what
-        What is lost.
-    why
-        What is known of the reason, as a clause; may be empty.
-    """
-
-    key: str
-    causes: tuple[str, ...]
-    value: float
-    of: float
-    share: float
-    what: str = ""
-    why: str = ""
-
-
 def numbers_of(documents: Iterable[Mapping[str, Any]]) -> dict[tuple[str, str], Mapping[str, Any]]:
     """Numbers of ``metrics.json`` documents by name and subject; the first of equal ones.
 
@@ -274,8 +246,7 @@ def gains_of(overview: Overview, numbers: Numbers) -> list[Gain]:
     -------
     list of Gain
     """
-    data = (Gain(one.key, (), one.lost, one.of, one.share, one.what, one.why) for one in overview.lost)
-    found = [*metric_gains(numbers), *data]
+    found = [*metric_gains(numbers), *overview.lost]
     return sorted((one for one in found if one.share >= LISTED), key=lambda one: -one.share)
 
 

@@ -16,7 +16,7 @@ import pandas as pd
 
 from wildlab.analysis import Fact
 from wildlab.analysis.accuracy import Accuracy, Repeats, on_one_heading
-from wildlab.analysis.diagnose import CAUSES, Diagnosis
+from wildlab.analysis.diagnose import CAUSES, Diagnosis, nonzero
 from wildlab.analysis.georeference import errors_of
 from wildlab.analysis.verdict import (
     FEW_POINTS,
@@ -47,9 +47,7 @@ from wildlab.reporting.georeferencing_tables import (
     outliers_table,
     parameters_table,
     parts_table,
-    significant_parameters,
     simplest_rivals,
-    terrain_section,
 )
 from wildlab.reporting.layout import ADVICE
 from wildlab.reporting.published import load_published
@@ -201,7 +199,7 @@ def significant_causes(diagnosis: Diagnosis) -> tuple[str, ...]:
 
     Only these are named: what a fit takes along without being able to tell it from zero is not blamed.
     """
-    parameters = set(significant_parameters(diagnosis.calibration))
+    parameters = set(nonzero(diagnosis.calibration))
     causes = diagnosis.winner.causes
     return tuple(cause for cause in causes if parameters & set(CAUSES[cause])) or causes
 
@@ -501,9 +499,8 @@ def show_accuracy(
     if diagnosis is not None:
         wording.table("axes", axes_table(found.axes))
     wording.table("parts", parts_table(found))
-    if found.noise is not None:
-        wording.table("noise", noise_table(found.noise, found.assumed))
-    terrain_section(report, found.observations, found.points)
+    if diagnosis is not None:
+        wording.table("noise", noise_table(diagnosis.noise, found.assumed))
     report.method(texts.method)
 
 
@@ -632,7 +629,7 @@ def verdict_of_repeats(found: Repeats, problems: int = 0) -> tuple[Verdict, Mess
 
 
 def show_repeats(report: Report, flight: Flight, found: Repeats, amiss: Sequence[str]) -> None:
-    """Write the page, but for its terrain, and record its numbers.
+    """Write the page, and record its numbers.
 
     Parameters
     ----------

@@ -20,6 +20,7 @@ from wildlab.analysis.overview import (
     JUMP_M,
     LEANT_DEG,
     Alarm,
+    Gain,
     Issue,
     Overview,
     beside_satellites,
@@ -30,7 +31,6 @@ from wildlab.analysis.verdict import (
     LISTED,
     MOST,
     WORTH,
-    Gain,
     Numbers,
     Verdict,
     doubted,
@@ -295,12 +295,12 @@ def record(report: Report, overview: Overview, gains: Sequence[Gain], counts: Ma
     for gain in gains:
         report.metric("gain_share", gain.key, gain.share, "1")
     for lost in overview.lost:
-        report.metric("lost", lost.key, lost.lost, "1", n=lost.of)
+        report.metric("lost", lost.key, lost.value, "1", n=int(lost.of))
 
 
 def _without_pose(overview: Overview) -> int:
     """How many images have no pose."""
-    return next((one.lost for one in overview.lost if one.key == "images_without_pose"), 0)
+    return next((int(one.value) for one in overview.lost if one.key == "images_without_pose"), 0)
 
 
 def things_named(overview: Overview) -> int:
