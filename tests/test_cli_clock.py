@@ -46,7 +46,7 @@ def test_known_points_tell_it_where_motion_does_not(motion, points, said, tmp_pa
 
         return told
 
-    monkeypatch.setattr(module, "clock_from_motion", estimate(motion, "no pairs"))
+    monkeypatch.setattr(module, "clock_from_images", estimate(motion, "no pairs"))
     monkeypatch.setattr(module, "clock_from_points", estimate(points, "no points"))
     call = ["clock", str(tmp_path / "flight"), "--images", str(tmp_path / "images"), "--json"]
     ran = CliRunner().invoke(wildlab, call)

@@ -608,7 +608,7 @@ def axes_of(observations: Observations, scored: pd.DataFrame) -> dict[str, Array
     }
     flight = observations.flight
     nav = flight.nav[observations.source]
-    if flight.manifest.time.kind == "utc" and "frame_id" not in nav:
+    if flight.timed and "frame_id" not in nav:
         times = scored["time_s"].to_numpy(float)
         after, before = (poses_at(nav, times + shift)[0][:, :2] for shift in (0.5, -0.5))
         track = _unit(after - before, np.full(len(times), SLOWEST_M_S))

@@ -46,6 +46,7 @@ from wildlab.geometry.intrinsics import (
     parameters_of,
     view_errors,
 )
+from wildlab.geometry.mount import camera_rotation
 from wildlab.names import listed
 
 #: A view disagrees where its held-out error is this many times the median, and this many robust standard
@@ -477,7 +478,7 @@ def refuse_without_clock(flight: Flight, source: str | None = None) -> None:
     WildlabError
         Where its times merely number the images, or its poses belong to images by name.
     """
-    if flight.manifest.time.kind == "sequence":
+    if not flight.timed:
         raise WildlabError(
             "the images carry no time, so there is no clock to estimate",
             "import with times if the images have any",
@@ -494,7 +495,7 @@ def refuse_without_clock(flight: Flight, source: str | None = None) -> None:
         )
 
 
-def camera_clock_by_points(flight: Flight, source: str | None = None) -> ClockByPoints:
+def clock_from_points(flight: Flight, source: str | None = None) -> CameraClock:
     """What to add to the stamps of the images so that known points appear where they were seen.
 
     Parameters
@@ -503,11 +504,6 @@ def camera_clock_by_points(flight: Flight, source: str | None = None) -> ClockBy
         With frames, poses, pixel detections that name targets, and truth of these.
     source
         Name of the ``nav`` table; may be left out where there is one beside the truth's.
-
-    Returns
-    -------
-    ClockByPoints
-        All its offsets are whole ones, as ``clocks.camera_offset_s`` has them: not on top of the manifest's.
 
     Raises
     ------
@@ -528,16 +524,15 @@ def camera_clock_by_points(flight: Flight, source: str | None = None) -> ClockBy
             file=flight.folder,
             field="detections",
         )
-    at = pd.Index(frames["frame_id"]).get_indexer(pd.Index(pixels["frame_id"]))
-    stated = flight.manifest.clocks.camera_offset_s
+    at = flight.frame_rows(pixels["frame_id"])
     times = frame_times(flight)[at]
     table = pd.DataFrame({"target_id": pixels["target_id"].to_numpy(object), "frame_id": pixels["frame_id"]})
 
     def seen_at(offset: float) -> tuple[CameraPoses, Array]:
         poses = camera_poses_at(flight, times + offset, source)
         if "pan_rad" in frames:
-            angles = {name: frames[f"{name}_rad"].to_numpy(float)[at] for name in ("pan", "tilt")}
-            poses = replace(poses, **angles)
+            pan, tilt = frames[["pan_rad", "tilt_rad"]].to_numpy(float)[at].T
+            poses = replace(poses, pan=pan, tilt=tilt)
         return poses, truth_of(flight, table.assign(time_s=times + offset))
 
     found = clock_by_points(
@@ -553,9 +548,8 @@ def camera_clock_by_points(flight: Flight, source: str | None = None) -> ClockBy
             file=flight.folder,
             field="detections",
         )
-    return found._replace(
-        offset_s=found.offset_s + stated, offsets=found.offsets + stated, rival_s=found.rival_s + stated
-    )
+    rests = {"points": found.points, "images": found.images, "blocks": found.draws}
+    return _told(flight, "points", found, rests, {"cost": found.cost})
 
 
 def image_motions(frames: Iterable[Frame], flight: Flight, camera: Camera) -> tuple[Indices, Array]:
@@ -598,9 +592,9 @@ def image_motions(frames: Iterable[Frame], flight: Flight, camera: Camera) -> tu
     return np.array(pairs, np.intp).reshape(-1, 2), np.array(motion, float).reshape(-1, 3)
 
 
-def camera_clock_by_motion(
+def clock_from_motions(
     flight: Flight, pairs: Indices, motion: Array, source: str | None = None
-) -> ClockByMotion:
+) -> CameraClock:
     """What to add to the stamps of the images so that they moved as the log says that the camera turned.
 
     Parameters
@@ -611,11 +605,6 @@ def camera_clock_by_motion(
         From `image_motions`.
     source
         Name of the ``nav`` table; may be left out where there is one beside the truth's.
-
-    Returns
-    -------
-    ClockByMotion
-        All its offsets are whole ones, as ``clocks.camera_offset_s`` has them.
 
     Raises
     ------
@@ -635,10 +624,22 @@ def camera_clock_by_motion(
             file=flight.folder,
             field="frames",
         )
-    stated = flight.manifest.clocks.camera_offset_s
-    return found._replace(
-        offset_s=found.offset_s + stated, offsets=found.offsets + stated, rival_s=found.rival_s + stated
-    )
+    rests = {"pairs": found.pairs, "correlation": found.peak, "rival_correlation": found.rival_correlation}
+    curve = {"correlation": found.correlation}
+    return _told(flight, "motion", found, rests | {"gain": found.gain}, curve)
+
+
+def clock_from_images(flight: Flight, frames: Iterable[Frame], source: str | None = None) -> CameraClock:
+    """`clock_from_motions` of images.
+
+    Raises
+    ------
+    WildlabError
+        As that.
+    """
+    refuse_without_clock(flight, source)
+    pairs, motion = image_motions(frames, flight, flight.manifest.geometry_camera())
+    return clock_from_motions(flight, pairs, motion, source)
 
 
 def _camera_motion(flight: Flight, source: str | None) -> tuple[Array, Array, Array]:
@@ -664,27 +665,19 @@ def _camera_motion(flight: Flight, source: str | None) -> tuple[Array, Array, Ar
     known &= np.diff(np.fmax.accumulate(at), prepend=-np.inf) > 0
     if known.sum() < len(t):
         return t, turned, moved
-    at, rates = at[known], rates[known] @ camera_rotation(flight)
+    at, rates = at[known], rates[known] @ camera_rotation(flight.manifest.geometry_mount())
     between = (rates[1:] + rates[:-1]) / 2 * np.diff(at)[:, None]
     by_gyro = np.vstack([np.zeros(3), np.cumsum(between, axis=0)])
     return at, by_gyro, np.stack([np.interp(at, t, one) for one in moved.T], axis=1)
 
 
-def camera_rotation(flight: Flight) -> Array:
-    """(3, 3) `R_bc` of a camera that is fixed to the airframe."""
-    still = CameraPoses(
-        flight.manifest.geometry_camera(), flight.manifest.geometry_mount(), np.zeros((1, 3)), np.eye(3)
-    )
-    return np.asarray(still.R_bc).reshape(-1, 3, 3)[0]
-
-
 class CameraClock(NamedTuple):
-    """An estimate of what to add to the stamps of the images.
+    """What to add to the stamps of the images, as ``clocks.camera_offset_s`` has it: not on top of that.
 
     Attributes
     ----------
     numbers
-        ``offset_s`` (for ``clocks.camera_offset_s``), ``sd_s``, ``certain``, ``method``, the next best offset
+        ``offset_s``, ``sd_s``, ``certain``, ``method``, the next best offset
         ``rival_s`` and what the estimate rests on.
     curve
         ``offset_s``, and ``cost`` or ``correlation``.
@@ -697,56 +690,24 @@ class CameraClock(NamedTuple):
     facts: tuple[Fact, ...]
 
 
-def clock_from_points(flight: Flight, source: str | None = None) -> CameraClock:
-    """`camera_clock_by_points` with its facts.
-
-    Raises
-    ------
-    WildlabError
-        As that.
-    """
-    found = camera_clock_by_points(flight, source)
-    rests = {"points": found.points, "images": found.images, "blocks": found.draws}
-    curve = pd.DataFrame({"offset_s": found.offsets, "cost": found.cost})
-    return _told("points", "known points", found, rests, curve)
-
-
-def clock_from_motion(
-    flight: Flight,
-    frames: Iterable[Frame],
-    source: str | None = None,
-) -> CameraClock:
-    """`camera_clock_by_motion` of images, with its facts.
-
-    Raises
-    ------
-    WildlabError
-        As that.
-    """
-    refuse_without_clock(flight, source)
-    pairs, motion = image_motions(frames, flight, flight.manifest.geometry_camera())
-    found = camera_clock_by_motion(flight, pairs, motion, source)
-    rests = {"pairs": found.pairs, "correlation": found.peak, "rival_correlation": found.rival_correlation}
-    curve = pd.DataFrame({"offset_s": found.offsets, "correlation": found.correlation})
-    return _told("motion", "image motion", found, rests | {"gain": found.gain}, curve)
-
-
 def _told(
+    flight: Flight,
     way: str,
-    method: str,
     found: ClockByPoints | ClockByMotion,
     rests: Mapping[str, float],
-    curve: pd.DataFrame,
+    curve: dict[str, Array],
 ) -> CameraClock:
+    stated = flight.manifest.clocks.camera_offset_s
+    offset_s, rival_s = found.offset_s + stated, found.rival_s + stated
     numbers: dict[str, object] = {
-        "offset_s": found.offset_s,
+        "offset_s": offset_s,
         "sd_s": found.sd_s,
         "certain": found.certain,
-        "method": method,
-        "rival_s": found.rival_s,
+        "method": {"points": "known points", "motion": "image motion"}[way],
+        "rival_s": rival_s,
         **rests,
     }
     shown = {name: f"{one:.2f}" if isinstance(one, float) else str(one) for name, one in rests.items()}
-    shown |= {name: f"{getattr(found, name):+.3f}" for name in ("offset_s", "rival_s")}
-    key = f"clock-{way}-{'certain' if found.certain else 'open'}"
-    return CameraClock(numbers, curve, (fact(key, sd_s=f"{found.sd_s:.3f}", **shown),))
+    shown |= {"offset_s": f"{offset_s:+.3f}", "rival_s": f"{rival_s:+.3f}", "sd_s": f"{found.sd_s:.3f}"}
+    said = fact(f"clock-{way}-{'certain' if found.certain else 'open'}", **shown)
+    return CameraClock(numbers, pd.DataFrame({"offset_s": found.offsets + stated} | curve), (said,))

@@ -141,7 +141,7 @@ def observe(
             field="detections",
         )
     name, nav = flight.pose_source(source)
-    at = pd.Index(frames["frame_id"]).get_indexer(pd.Index(pixels["frame_id"]))
+    at = flight.frame_rows(pixels["frame_id"])
     own_clock = frames[stamps].to_numpy(float) - frames["time_s"].to_numpy(float)
     times = (frame_times(flight) + own_clock + clock_shift)[at]
     p_nb, R_nb, covariance = poses_at(nav, times, pixels["frame_id"])
@@ -618,7 +618,7 @@ def recorded_answers(flight: Flight) -> tuple[dict[str, pd.DataFrame], list[str]
         if flight.manifest.scoring.rule == "labelled" and not known.any():
             unlabelled.append(str(program))
             continue
-        at = pd.Index(frames["frame_id"]).get_indexer(pd.Index(rows["frame_id"]))
+        at = flight.frame_rows(rows["frame_id"])
         points = rows[["detection_id", "frame_id", "north_m", "east_m"]].assign(
             target_id=names, time_s=frames["time_s"].to_numpy(float)[at],
             cov_nn=np.nan, cov_ne=np.nan, cov_ee=np.nan,
@@ -642,9 +642,9 @@ def blocks_of(flight: Flight, table: pd.DataFrame) -> Indices:
     (N,) integers from 0
     """
     times = table["time_s"].to_numpy(float)
-    if flight.manifest.time.kind == "utc" and np.isfinite(times).all():
+    if flight.timed and np.isfinite(times).all():
         return time_blocks(times, seconds=True)
-    place = pd.Index(flight.table("frames")["frame_id"]).get_indexer(pd.Index(table["frame_id"]))
+    place = flight.frame_rows(table["frame_id"])
     return time_blocks(place, seconds=False)
 
 

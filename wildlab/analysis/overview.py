@@ -259,23 +259,23 @@ def _placed(flight: Flight, source: str | None) -> tuple[Mask, Mask]:
 def lost_data(flight: Flight, source: str | None, streams: dict[str, Pace]) -> list[Gain]:
     """What is lost, with its denominator: images, detections, seconds."""
     found = []
-    frames, timed = flight.frames, flight.manifest.time.kind == "utc"
+    frames = flight.frames
     if frames is not None and len(frames) and source is not None:
         posed, turned = np.zeros(len(frames), bool), np.ones(len(frames), bool)
         with suppress(WildlabError):
             p, angles = frame_poses(flight, source)[0], gimbal_angles(flight)
             posed, turned = np.asarray(np.isfinite(p).all(axis=1)), np.isfinite(np.sum(angles, axis=0))
-        why = _why_unposed(flight, source, ~posed) if timed and (~posed).any() else ""
+        why = _why_unposed(flight, source, ~posed) if flight.timed and (~posed).any() else ""
         found.append(_lost("images_without_pose", int((~posed).sum()), len(frames), "images", why))
         missing = int((posed & ~turned).sum())
         found.append(_lost("images_without_gimbal", missing, len(frames), "images"))
         placed, has_pose = _placed(flight, source)
         away = int((has_pose & ~placed).sum())
         found.append(_lost("detections_off_ground", away, len(placed), "detections"))
-    if timed:
+    if flight.timed:
         found += _unrecorded(flight, source, streams)
     imu = streams.get("imu")
-    if timed and imu is not None and imu.missing:
+    if flight.timed and imu is not None and imu.missing:
         found.append(_lost("inertial_samples", imu.missing, imu.n + imu.missing, "inertial samples"))
     found += _untrue(flight)
     return [one for one in found if one.value]
@@ -326,7 +326,7 @@ def _untrue(flight: Flight) -> list[Gain]:
     if truth is None or detections is None or frames is None or "target_id" not in detections or truth.empty:
         return []
     named = detections[detections["target_id"].fillna("") != ""]
-    at = pd.Index(frames["frame_id"]).get_indexer(pd.Index(named["frame_id"]))
+    at = flight.frame_rows(named["frame_id"])
     times = np.where(at >= 0, frame_times(flight)[at], np.nan)
     with suppress(WildlabError):  # of a truth whose stamps do not increase nothing is known
         places = truth_of(flight, named.assign(time_s=times))
@@ -645,8 +645,7 @@ def look_over(flight: Flight, source: str | None = None) -> Overview:
     if source is not None:
         flight.pose_source(source)
     source = source or next(iter(flight.estimated_sources), None)
-    streams = paces(flight)
-    timed = flight.manifest.time.kind == "utc"
+    streams, timed = paces(flight), flight.timed
     carried = [pace for name, pace in streams.items() if pace.n and name != "truth"] or [
         pace for pace in streams.values() if pace.n
     ]
@@ -704,7 +703,7 @@ def _path(flight: Flight, source: str | None) -> Path | None:
     for who, (table, stamps) in tables.items():
         t, place = ordered(table, POSITION, stamps)
         if len(t) > (who == "truth"):
-            return Path(who, t, place, flight.manifest.time.kind == "utc")
+            return Path(who, t, place, flight.timed)
     return None
 
 
@@ -765,7 +764,7 @@ def _above(flight: Flight, path: Path | None) -> tuple[Array, str] | None:
 
 
 def _vibration(flight: Flight) -> tuple[Array, Array] | None:
-    if flight.imu is None or flight.manifest.time.kind != "utc":
+    if flight.imu is None or not flight.timed:
         return None
     t, force = ordered(flight.imu, FORCE)
     found = vibration_of(t, force)

@@ -218,7 +218,7 @@ def clock(
 
 def _estimate(flight: Flight, images: Path | None, source: str | None) -> CameraClock:
     from wildlab.analysis import fact
-    from wildlab.analysis.camera import clock_from_motion, clock_from_points
+    from wildlab.analysis.camera import clock_from_images, clock_from_points
 
     if images is None:
         return clock_from_points(flight, source)
@@ -227,7 +227,7 @@ def _estimate(flight: Flight, images: Path | None, source: str | None) -> Camera
     ids = [] if flight.frames is None else [str(one) for one in flight.frames["frame_id"]]
     refused: WildlabError | None = None
     try:
-        found = clock_from_motion(flight, open_frames(images, ids=ids), source)
+        found = clock_from_images(flight, open_frames(images, ids=ids), source)
         if found.numbers["certain"]:
             return found
         why = found.facts

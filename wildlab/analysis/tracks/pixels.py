@@ -12,7 +12,6 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.analysis.georeference import observe
@@ -146,7 +145,7 @@ def read_pixels(flight: Flight, source: str, target: str | None = None) -> Pixel
     order = np.argsort(stamps, kind="stable")
     place = np.empty(len(order), int)
     place[order] = np.arange(len(order))
-    row = place[pd.Index(frames["frame_id"]).get_indexer(pd.Index(seen.table["frame_id"]))]
+    row = place[flight.frame_rows(seen.table["frame_id"])]
     first, last = int(row.min()), int(row.max()) + 1
     times, ids = stamps[order][first:last], frames["frame_id"].iloc[order[first:last]]
     poses_name, nav = flight.pose_source(source)

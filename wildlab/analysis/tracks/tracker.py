@@ -142,7 +142,7 @@ def refuse_without_times(flight: Flight) -> None:
     WildlabError
         Of such a flight.
     """
-    if flight.manifest.time.kind != "utc":
+    if not flight.timed:
         raise WildlabError(
             "the photos carry no time",
             "import the flight with times",
