@@ -152,6 +152,9 @@ def test_check_does_not_call_a_flight_usable_that_contradicts_itself(tmp_path):
     save_flight(flight, tmp_path / "flight")
     code, out, _ = call("check", str(tmp_path / "flight"))
     assert code == 2 and ": yes" not in out
+    # What is computed from it all the same says so, beside the file.
+    code, out, err = call("georeference", str(tmp_path / "flight"), "--out", str(tmp_path / "points.csv"))
+    assert code == 0 and "problem: " in err and "problem: " not in out
 
 
 @pytest.mark.parametrize(

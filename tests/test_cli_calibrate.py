@@ -59,7 +59,8 @@ def test_causes_that_are_inseparable_are_named(folder, tmp_path, monkeypatch):
     winner = SimpleNamespace(causes=("clock",), name="clock", gain=gain)
     rival = SimpleNamespace(causes=("boresight",), gain=SimpleNamespace(with_=2.1, counts=True))
     for rivals in ((rival,), ()):
-        learn(monkeypatch, winner=winner, rivals=rivals, models=[winner, *rivals])
+        ranked = SimpleNamespace(rivals=tuple(range(1, 1 + len(rivals))))
+        learn(monkeypatch, winner=winner, ranked=ranked, models=[winner, *rivals])
         out = succeed("calibrate", folder / "short", "--out", tmp_path / "c.toml")
         assert ("boresight" in out) == bool(rivals)
 

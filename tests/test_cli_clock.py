@@ -11,8 +11,8 @@ from click.testing import CliRunner
 
 from tests.analysis.survey_twin import Survey, simulate
 from tests.annotation import write_images
-from wildlab.analysis import camera_clock
-from wildlab.analysis.camera_clock import CameraClock
+from wildlab.analysis import camera as module
+from wildlab.analysis.camera import CameraClock
 from wildlab.cli import wildlab
 from wildlab.errors import WildlabError
 from wildlab.flight.store import save_flight
@@ -46,8 +46,8 @@ def test_known_points_tell_it_where_motion_does_not(motion, points, said, tmp_pa
 
         return told
 
-    monkeypatch.setattr(camera_clock, "clock_from_motion", estimate(motion, "no pairs"))
-    monkeypatch.setattr(camera_clock, "clock_from_points", estimate(points, "no points"))
+    monkeypatch.setattr(module, "clock_from_images", estimate(motion, "no pairs"))
+    monkeypatch.setattr(module, "clock_from_points", estimate(points, "no points"))
     call = ["clock", str(tmp_path / "flight"), "--images", str(tmp_path / "images"), "--json"]
     ran = CliRunner().invoke(wildlab, call)
     if motion is None and points is None:

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from tests.commands import refuse, succeed
-from wildlab.analysis.tracks.scores import COLUMNS
+from wildlab.analysis.tracks.tracker import COLUMNS
 from wildlab.flight.store import save_flight
 from wildlab.runner.record.provenance import provenance_of_flight
 from wildlab.simulation.twins import simulate_twin

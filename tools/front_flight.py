@@ -24,7 +24,7 @@ from wildlab.analysis.georeference import (
     georeference,
     observe,
 )
-from wildlab.analysis.image_coverage import cover_images
+from wildlab.analysis.overview import cover_images
 from wildlab.analysis.tracks.pixels import CvTuning, read_pixels, start
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic

@@ -11,8 +11,7 @@ import pandas as pd
 import pytest
 
 from tests.analysis.building import manifest_of, poses_table, surveyed
-from wildlab.analysis.evaluate import score_points
-from wildlab.analysis.georeference import Observations, georeference, observe, pose_errors
+from wildlab.analysis.georeference import Observations, georeference, observe, pose_errors, score_points
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import euler_to_matrix

@@ -10,8 +10,7 @@ import pandas as pd
 from tests.analysis.building import manifest_of, poses_table
 from wildlab.analysis.tracks.noise_model import NoiseModel, model_noise, settings_of
 from wildlab.analysis.tracks.scans import Scans, scans_of
-from wildlab.analysis.tracks.scores import score_tracks
-from wildlab.analysis.tracks.tracker import TrackingResult
+from wildlab.analysis.tracks.tracker import TrackingResult, score_tracks
 from wildlab.flight.manifest import parse_settings
 from wildlab.flight.store import Flight
 

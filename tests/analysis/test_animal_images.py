@@ -16,7 +16,7 @@ from wildlab.analysis.animal_images import (
     sight_from,
     take_images,
 )
-from wildlab.analysis.plans.coverage import ExecutionErrors, displaced
+from wildlab.analysis.plan_coverage import ExecutionErrors, displaced
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix
@@ -52,7 +52,7 @@ def test_all_that_an_image_shows_lies_in_its_circle(north, east, above, roll, pi
     seen = shown(LAND, CAMERA, one.p_nc[0], one.R_nc[0], grid, EXACT)
     away = np.linalg.norm(grid[seen] - middle[0], axis=1)
     assert (away <= radius[0]).all()
-    sight = sight_from(LAND, CAMERA, one.p_nc[0], one.R_nc[0], (middle[0], float(radius[0])), EXACT)
+    sight = sight_from(LAND, CAMERA, one.p_nc[0], one.R_nc[0], EXACT)
     assert np.array_equal(sight(grid), seen.astype(float))
 
 

@@ -11,16 +11,16 @@ import pytest
 
 from tests.analysis.test_detection_part_fit import sample
 from tests.refused import refused
-from wildlab.analysis.detecting import detect as subject
-from wildlab.analysis.detecting.command import samples_of
-from wildlab.analysis.detecting.detect import (
+from wildlab.analysis import detectors as subject
+from wildlab.analysis.detection_command import samples_of
+from wildlab.analysis.detection_fit import fit_shapes, fit_thresholds
+from wildlab.analysis.detection_scores import judge_detections
+from wildlab.analysis.detectors import (
     detect_frame,
     read_thresholds,
     run_detection,
     write_thresholds,
 )
-from wildlab.analysis.detecting.fit import fit_shapes, fit_thresholds
-from wildlab.analysis.detecting.scores import judge_detections
 from wildlab.detection.contrast import Contrast, Shape
 from wildlab.detection.floating import FloatingThresholds
 from wildlab.evaluation.intervals import Interval

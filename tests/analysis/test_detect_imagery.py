@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wildlab.analysis.detecting.command import samples_of
-from wildlab.analysis.detecting.detect import detect_frame
-from wildlab.analysis.detecting.fit import Fitted, Sample, candidates, fit_part, fit_shapes, fit_thresholds
+from wildlab.analysis.detection_command import samples_of
+from wildlab.analysis.detection_fit import Fitted, Sample, candidates, fit_part, fit_shapes, fit_thresholds
+from wildlab.analysis.detectors import detect_frame
 from wildlab.detection.detections import Detections
 from wildlab.evaluation.matching import Rates, match, rates
 from wildlab.flight.readers.frames import open_frames

@@ -10,7 +10,7 @@ import pandas as pd
 from tests.analysis.test_detect import folder
 from tests.commands import succeed
 from tests.refused import refused
-from wildlab.analysis.detecting.scores import read_others
+from wildlab.analysis.detection_scores import read_others
 from wildlab.flight.readers.labels import read_labels
 
 #: Of the frames of `folder`.

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wildlab.analysis.detecting.fit import (
+from wildlab.analysis.detection_fit import (
     Sample,
     fit_part,
     part_of,

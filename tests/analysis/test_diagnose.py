@@ -13,8 +13,7 @@ from tests.analysis.survey_twin import CAMERA, Survey, simulate
 from tests.sound_flights import simulate_sound_flight
 from wildlab.analysis.accuracy import compare_sightings, judge_repeats, learn_from
 from wildlab.analysis.diagnose import diagnose, find_implausible
-from wildlab.analysis.evaluate import errors_of, score_points
-from wildlab.analysis.georeference import covariances_of, observe
+from wildlab.analysis.georeference import covariances_of, errors_of, observe, score_points
 from wildlab.evaluation.outliers import find_outliers
 from wildlab.geometry.corrections import BOUNDS, Calibration
 

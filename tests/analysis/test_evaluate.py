@@ -7,12 +7,13 @@ import pandas as pd
 import pytest
 
 from tests.analysis.conftest import changed, score
-from wildlab.analysis.evaluate import (
+from wildlab.analysis.accuracy import on_one_heading
+from wildlab.analysis.georeference import (
     errors_of,
-    on_one_heading,
+    observe,
+    pose_errors,
     recorded_answers,
 )
-from wildlab.analysis.georeference import observe, pose_errors
 from wildlab.flight.clocks import covariance_columns
 from wildlab.geometry.frames import (
     euler_to_matrix,

@@ -8,8 +8,13 @@ import pytest
 
 from tests.analysis.robots import boat, joined, paused, robot, robot_flight, rows_of
 from wildlab.analysis.tracks.scans import SLOTS, predict_scan, scans_of, truths_at
-from wildlab.analysis.tracks.scores import compare_sensors, estimates_table, worth_of_errors, write_estimates
-from wildlab.analysis.tracks.tracker import track
+from wildlab.analysis.tracks.tracker import (
+    compare_sensors,
+    estimates_table,
+    track,
+    worth_of_errors,
+    write_estimates,
+)
 from wildlab.flight.manifest import Settings
 
 # --- a heading that is off ----------------------------------------------------------------------------------

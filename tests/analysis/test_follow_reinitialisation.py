@@ -14,9 +14,8 @@ from tests.analysis.robots import KNOWN, joined, paused, robot_flight, rows_of
 from wildlab.analysis.tracks import single_target, tracker
 from wildlab.analysis.tracks.noise_model import NoiseModel, SensorInputs, TargetModel
 from wildlab.analysis.tracks.scans import Scans, Truth, sensor_of
-from wildlab.analysis.tracks.scores import estimates_table, score_tracks, seen_of, used_of
 from wildlab.analysis.tracks.single_target import SensorTrack, ends_of, track_target
-from wildlab.analysis.tracks.tracker import TrackingResult
+from wildlab.analysis.tracks.tracker import TrackingResult, estimates_table, score_tracks, seen_of, used_of
 from wildlab.flight.manifest import parse_settings
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses

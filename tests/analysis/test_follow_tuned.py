@@ -11,7 +11,7 @@ from tests.analysis.conftest import changed
 from tests.analysis.robots import boat, paused, robot_flight, rows_of, seen_only
 from tests.refused import refused
 from wildlab.analysis.tracks import tracker
-from wildlab.analysis.tracks.scores import _between
+from wildlab.analysis.tracks.tracker import _between
 from wildlab.analysis.tracks.tuning import read_tuned, refuse_same, tune_flight, tuned_text
 from wildlab.flight.manifest import parse_settings
 from wildlab.tracking.motion import white_acceleration

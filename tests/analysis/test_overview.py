@@ -13,8 +13,7 @@ import pytest
 
 from tests.analysis.building import manifest_of, poses_table, surveyed
 from tests.analysis.conftest import build, receiver, without_poses
-from wildlab.analysis.image_coverage import Recovered, cover_images
-from wildlab.analysis.overview import TROUBLES, look_over
+from wildlab.analysis.overview import TROUBLES, Gain, cover_images, look_over
 from wildlab.analysis.verdict import (
     gains_of,
     numbers_of,
@@ -125,7 +124,7 @@ def test_what_is_wrong_along_the_path_is_found():
     assert [one.what for one in overview.troubles] == [what for what in TROUBLES if what in found]
 
 
-def lost_of(flight: Flight, key: str) -> Recovered:
+def lost_of(flight: Flight, key: str) -> Gain:
     (lost,) = [one for one in look_over(flight).lost if one.key == key]
     return lost
 
@@ -135,7 +134,7 @@ def test_images_in_a_hole_are_counted_with_the_reason():
     frames = flight.tables["frames"]
     inside = int(((frames["time_s"] > 10.0) & (frames["time_s"] < 15.0)).sum())
     lost = lost_of(flight, "images_without_pose")
-    assert (lost.lost, lost.of) == (inside, len(frames)) and inside
+    assert (lost.value, lost.of) == (inside, len(frames)) and inside
     flight.nav["logged"] = flight.nav["logged"].query("time_s < 20")
     lost = lost_of(flight, "images_without_pose")
     after = int((frames["time_s"] >= 20).sum())
@@ -147,7 +146,7 @@ def test_detections_whose_target_has_no_truth_are_counted():
     detections = flight.tables["detections"]
     detections.loc[:4, "target_id"] = "nobody"
     lost = lost_of(flight, "detections_without_truth")
-    assert (lost.lost, lost.of) == (5, int((detections["target_id"] != "").sum()))
+    assert (lost.value, lost.of) == (5, int((detections["target_id"] != "").sum()))
 
 
 def entry(name: str, subject: str, value: float, **more: float) -> dict[str, Any]:

@@ -10,11 +10,10 @@ import pytest
 from tests.flight.test_area import collection, feature, polygon
 from tests.planning.test_courses import curvature
 from tests.refused import refused
-from wildlab.analysis.plans.coverage import cover
-from wildlab.analysis.plans.plan import make_plan, nearest_ground, refuse_near
-from wildlab.analysis.plans.request import PlanRequest, look
-from wildlab.analysis.plans.result import missions, plan_result
-from wildlab.analysis.plans.sorties import TOLERANCE, fly_rows, follow
+from wildlab.analysis.plan import TOLERANCE, fly_rows, follow, make_plan, nearest_ground, refuse_near
+from wildlab.analysis.plan_coverage import cover
+from wildlab.analysis.plan_request import PlanRequest, look
+from wildlab.analysis.plan_result import missions, plan_result
 from wildlab.flight.writers import CHANGE_SPEED, mission_items
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.terrain import Terrain
@@ -81,7 +80,7 @@ def test_plans_warn_of_few_pixels_and_of_a_head_wind(field, given, facts):
         {"battery_min": 30.0, "animals": 3.0, "photo_m": 5.0, "names": True},
         {"turn_radius_m": 40.0, "wind_m_s": 4.0, "wind_from_deg": 90.0, "heights": "ground"},
         {"gimbal": "adaptive", "swing_deg": 20.0, "tilt_deg": 70.0, "trees_m": 5.0},
-        {"exposure_s": 0.4, "gimbal": "roll", "swing_deg": 30.0, "home": (58.66, 16.46)},
+        {"exposure_ms": 400.0, "gimbal": "roll", "swing_deg": 30.0, "home": (58.66, 16.46)},
     ],
 )
 def test_every_fact_has_its_words(field, given):

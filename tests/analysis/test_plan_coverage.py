@@ -8,9 +8,9 @@ import pytest
 
 from tests.analysis.test_plan import CAMERA, hills, plan
 from tests.flight.test_area import collection, feature, polygon
-from wildlab.analysis.plans.coverage import cover, gimbal_rate, images_of
-from wildlab.analysis.plans.plan import make_plan
-from wildlab.analysis.plans.request import FURTHEST, PlanRequest, simplified
+from wildlab.analysis.plan import make_plan
+from wildlab.analysis.plan_coverage import cover, gimbal_rate, images_of
+from wildlab.analysis.plan_request import FURTHEST, PlanRequest, simplified
 from wildlab.geometry.camera import project
 
 HOLE = [[50, 50], [50, 90], [90, 90], [90, 50], [50, 50]]
@@ -105,13 +105,13 @@ def test_a_fixed_wing_points_its_camera_where_its_nose_is(field, direction, wind
 
 @pytest.mark.parametrize("gimbal", ["yaw", "roll", "adaptive"])
 def test_a_camera_that_swings_sees_a_wider_strip(field, gimbal):
-    given = dict(height_m=50.0, tilt_deg=60.0, gimbal=gimbal, swing_deg=30.0, exposure_s=0.001, speed_m_s=5.0)
+    given = dict(height_m=50.0, tilt_deg=60.0, gimbal=gimbal, swing_deg=30.0, exposure_ms=1.0, speed_m_s=5.0)
     made, still = plan(field, **given), plan(field, height_m=50.0, tilt_deg=60.0)
     assert made.strip > 1.3 * still.strip and len(made.pattern.rows) < len(still.pattern.rows)
     assert gimbal_rate(still) == 0 < gimbal_rate(made)
     (found,) = cover(made)
     assert found.seen > 0.9
-    (blurred,) = cover(plan(field, **{**given, "exposure_s": 0.5}))
+    (blurred,) = cover(plan(field, **{**given, "exposure_ms": 500.0}))
     assert blurred.seen < 0.1 and blurred.share(blurred.blurred) > 0.8 and not blurred.hidden.any()
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wildlab.analysis.plans.coverage import ExecutionErrors, Looks, with_errors
+from wildlab.analysis.plan_coverage import ExecutionErrors, Looks, with_errors
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import matrix_to_rotation_vector
 from wildlab.geometry.terrain import Terrain

@@ -22,8 +22,8 @@ from wildlab.analysis.tracks.pixels import (
     track_schmidt,
     truth_states,
 )
-from wildlab.analysis.tracks.scores import STATE, estimates_table, score_tracks
 from wildlab.analysis.tracks.single_target import TOGETHER
+from wildlab.analysis.tracks.tracker import STATE, estimates_table, score_tracks
 from wildlab.api import tracks
 from wildlab.api.tracks import FEW_INDEPENDENT, Consistency
 from wildlab.evaluation.consistency import Average, Series, chi_square_interval

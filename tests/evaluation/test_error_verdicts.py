@@ -40,6 +40,17 @@ def test_of_sound_flights_one_in_ten_has_an_axis_told_from_zero():
     assert 4 <= wrong <= 20 + 3 * np.sqrt(200 * 0.1 * 0.9)
 
 
+def test_where_errors_outlast_the_flight_there_is_no_interval():
+    """A minute of an error that drifts by: wider than all errors lie apart, an interval says nothing."""
+    times = np.arange(0.0, 60.0, 0.25)
+    drift = np.outer(np.sin(times / 20), [2.0, 1.0])
+    blocks = time_blocks(times, seconds=True)
+    axes = {"north": [1.0, 0.0], "east": [0.0, 1.0]}
+    for errors, known in ((drift + normal(1, 0.1), False), (normal(1), True)):
+        for one in split_along(errors, axes, blocks).values():
+            assert np.isfinite(one.mean).tolist() == [True, known, known] and not one.constant
+
+
 def test_a_constant_that_is_certain_and_small_is_negligible():
     found = split_along(
         normal(2, n=2400) + np.array([0.3, 0.0]), {"north": [1.0, 0.0]}, np.arange(2400) // 10

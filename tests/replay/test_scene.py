@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wildlab.analysis.image_coverage import cover_images
+from wildlab.analysis.overview import cover_images
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight

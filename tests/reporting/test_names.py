@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 import wildlab
 from tests.reporting.test_charts import track
 from tests.reporting.test_many_tracks import made
-from wildlab.analysis.detecting.detect import TABLE_COLUMNS
+from wildlab.analysis.detectors import TABLE_COLUMNS
 from wildlab.files import csv_text, read_csv
 from wildlab.names import FORMULA
 from wildlab.reporting.charts import drawing, following, navigation, overview, tracks

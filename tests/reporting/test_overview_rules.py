@@ -17,7 +17,7 @@ from wildlab.reporting import overview as page
 from wildlab.reporting.overview import Judged
 
 TEXTS = load_texts("overview").answers
-#: What may be lost: the keys of `wildlab.analysis.image_coverage.lost_data`.
+#: What may be lost: the keys of `wildlab.analysis.overview.lost_data`.
 LOST = (
     "images_without_pose",
     "images_without_gimbal",
@@ -82,6 +82,22 @@ def test_the_most_pressing_is_said_first(found, keys):
     assert [one.key for one in page.answer(found)] == keys
 
 
+OUT, CAUSE = gain("far_out", 0.5, ()), gain(share=0.3, causes=("clock",))
+
+
+@pytest.mark.parametrize(
+    ("found", "keys"),
+    [
+        (judged(Verdict.FIX, gains=[OUT, CAUSE]), ["gain-cause-remedy", "gain-outliers-remedy"]),
+        # What is far out may be turns under a clock that is wrong.
+        (judged(Verdict.MEND, gains=[OUT, CAUSE], problems=1), ["problems-remedy", "gain-cause-remedy"]),
+        (judged(Verdict.FIX, gains=[OUT], possible=gain(share=0.2)), []),
+    ],
+)
+def test_outliers_are_no_advice_where_what_they_are_of_is_open(found, keys):
+    assert [one.key for one in page.advice(found)] == keys
+
+
 COUNTS = {"worth": 0, "troubled": 0}
 
 
@@ -109,8 +125,9 @@ def test_every_sentence_has_its_words_and_every_word_its_sentence():
     said += [page.issue_message(Issue("position jumps", np.array([[5.0, 5.0]])), LASTING)]
     gains = [gain(), gain("far_out", causes=()), *(gain(key, causes=()) for key in LOST)]
     said += [page.gain_message(one) for one in gains]
-    said += list(page._with_remedies(gains))
+    said += [one for each in gains for one in page.advice(judged(Verdict.MEND, gains=[each]))]
+    said += page.advice(judged(Verdict.MEND, problems=1))
     for one in said:
         assert set(re.findall(r"{(\w+)}", TEXTS[one.key])) <= set(one.values), one.key
     rest = set(TEXTS) - {one.key for one in said}
-    assert all(key.startswith(("reason-", "limit-", "tables")) for key in rest), rest
+    assert all(key.startswith(("reason-", "limit-")) for key in rest), rest

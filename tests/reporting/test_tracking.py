@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wildlab.analysis.tracks.scores import SensorPair, leading_filter
+from wildlab.analysis.tracks.tracker import SensorPair, leading_filter
 from wildlab.evaluation.consistency import Average
 from wildlab.messages.catalogue import load_texts
 from wildlab.reporting import tracking as page
@@ -112,6 +112,16 @@ def test_what_could_not_be_judged_is_in_no_number_and_makes_nothing_sound():
     first = page.answer(many, [])[0]
     assert first.key == "errors-mixed" and (first.values["judged"], first.values["rmse"]) == ("1", "4.0 m")
     assert colour(many) != "good" == colour(pd.concat([rows().iloc[1:], *others[:0]]))
+
+
+def test_every_track_is_in_the_denominator():
+    """Two judged tracks, one that nothing could be compared with, and one by a sensor without that filter."""
+    lost = rows(target="t", compared=0, rmse=np.nan, nees=np.nan, verdict="not judged")
+    other = rows().iloc[:1].assign(sensor="lidar")
+    both = pd.concat([rows(), rows(target="u", nees=50.0, verdict="overconfident"), lost, other])
+    first = page.answer(both, [])[0]
+    assert first.key == "errors-mixed" and (first.values["n"], first.values["judged"]) == ("4", "3")
+    assert page.reason(both).values["counts"] == "1 consistent, 2 overconfident, 1 not judged"
 
 
 def test_few_values_make_a_no_a_perhaps_not():

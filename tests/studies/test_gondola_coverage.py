@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from tests.studies.claims import checks_of, said
-from wildlab.analysis.plans.coverage import as_planned
+from wildlab.analysis.plan_coverage import as_planned
 from wildlab.evaluation.shares import HOLDS, decide_check
 from wildlab.simulation.parameters import load_twin
 from wildlab.studies.gondola_coverage import (

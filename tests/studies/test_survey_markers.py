@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from wildlab.analysis.diagnose import diagnose
-from wildlab.analysis.evaluate import errors_of, recorded_answers, score_points
-from wildlab.analysis.georeference import georeference, observe
+from wildlab.analysis.georeference import errors_of, georeference, observe, recorded_answers, score_points
 from wildlab.evaluation.errors import summarise
 from wildlab.flight.importing import import_flight
 from wildlab.geometry.frames import (

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wildlab.analysis.detecting.command import samples_of
-from wildlab.analysis.detecting.fit import Sample
+from wildlab.analysis.detection_command import samples_of
+from wildlab.analysis.detection_fit import Sample
 from wildlab.detection.warm import Warm, find_warm
 from wildlab.evaluation.matching import Rates, match, rates
 from wildlab.flight.readers.frames import open_frames

@@ -5,28 +5,24 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from wildlab.analysis import Fact, fact
 from wildlab.analysis.diagnose import FEWEST_IMAGES, Diagnosis, diagnose
-from wildlab.analysis.evaluate import (
-    axes_of,
-    blocks_of,
-    errors_of,
-    score_points,
-    visible_error,
-)
 from wildlab.analysis.georeference import (
     Observations,
     assumed_deviations,
+    blocks_of,
     calibrated,
     covariances_of,
+    errors_of,
     georeference,
     observe,
     pose_errors,
+    score_points,
 )
 from wildlab.analysis.verdict import FEW_POINTS
 from wildlab.errors import WildlabError
@@ -47,7 +43,8 @@ from wildlab.evaluation.errors import (
     split_along,
     summarise,
 )
-from wildlab.evaluation.intervals import Halves, Labels, compare_halves
+from wildlab.evaluation.intervals import Halves, compare_halves
+from wildlab.evaluation.outliers import largest_visible
 from wildlab.flight.calibration_files import (
     UNITS,
     Conditions,
@@ -58,11 +55,19 @@ from wildlab.flight.calibration_files import (
     LearntParameter,
     refuse_other_camera,
 )
+from wildlab.flight.clocks import poses_at, truth_at
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.geometry.attitude_uncertainty import tilt_and_heading
 from wildlab.geometry.corrections import Calibration, apply_calibration, calibrated_camera
-from wildlab.geometry.frames import Array, euler_to_matrix, matrix_to_quaternion, quaternion_to_matrix
+from wildlab.geometry.frames import (
+    Array,
+    euler_to_matrix,
+    matrix_to_euler,
+    matrix_to_quaternion,
+    quaternion_to_matrix,
+    wrap,
+)
 
 
 @dataclass(frozen=True)
@@ -73,8 +78,6 @@ class Accuracy:
     ----------
     observations, points, scored
         What was put on the ground, where, and against the truth: N rows, lost points among them.
-    blocks
-        (N,) in time order.
     summary, intervals
         Of the errors as they are, and low and high of its figures by name (these images, resampled); none
         below six images.
@@ -91,8 +94,6 @@ class Accuracy:
     remaining
         What the errors are made of once the cause is taken off, or as they are where no cause gained anything
         for certain; without what is far out.
-    noise
-        How noisy the poses were; without what is far out.
     visible_m
         Where each point is held against the nearest mark: larger errors go to another one; else NaN.
     """
@@ -100,7 +101,6 @@ class Accuracy:
     observations: Observations
     points: pd.DataFrame
     scored: pd.DataFrame
-    blocks: Labels
     summary: ErrorSummary
     intervals: dict[str, tuple[float, float]]
     lost: int
@@ -110,7 +110,6 @@ class Accuracy:
     halves: Halves
     diagnosis: Diagnosis | None
     remaining: Scatter
-    noise: WanderNoise | None
     visible_m: float
 
     @property
@@ -175,7 +174,6 @@ def judge_accuracy(
         observations=observations,
         points=points,
         scored=scored,
-        blocks=blocks,
         summary=summary,
         intervals=intervals,
         lost=int((~np.isfinite(scored["error_m"])).sum()),
@@ -185,7 +183,6 @@ def judge_accuracy(
         halves=compare_halves(scored["error_m"].to_numpy(float), blocks),
         diagnosis=diagnosis,
         remaining=scatter_by_image(left, of["frame_id"]),
-        noise=None if diagnosis is None else diagnosis.noise,
         visible_m=visible_error(flight, scored) if by_nearest else np.nan,
     )
 
@@ -268,7 +265,7 @@ def compare_sightings(points: pd.DataFrame) -> pd.DataFrame:
     -------
     DataFrame
         The points that name a thing, with ``truth_id`` (its name), ``error_north_m``, ``error_east_m`` and
-        ``error_m``, as from `wildlab.analysis.evaluate.score_points`; NaN where no other image shows it.
+        ``error_m``, as from `wildlab.analysis.georeference.score_points`; NaN where no other image shows it.
     """
     named = points[points["target_id"].astype(str) != ""].reset_index(drop=True)
     xy, things = named[["north_m", "east_m"]].to_numpy(float), named["target_id"].to_numpy(str)
@@ -373,6 +370,16 @@ def learn_flight(
     return learn_from(observations, diagnosis), diagnosis
 
 
+def corrections(calibration: Calibration) -> list[dict[str, Any]]:
+    """``name``, ``value``, ``low``, ``high`` (95 %) and ``unit`` of each parameter, as a file has it."""
+    rows = []
+    for name in calibration.names:
+        scale, ends = _SCALES.get(UNITS[name], 1.0), calibration.interval(name)
+        value, low, high = (scale * one for one in (calibration.value(name), *ends))
+        rows.append({"name": name, "value": value, "low": low, "high": high, "unit": UNITS[name]})
+    return rows
+
+
 def learn_from(observations: Observations, diagnosis: Diagnosis) -> Learnt:
     """What a diagnosis teaches: corrections only where they gained something for certain.
 
@@ -395,17 +402,8 @@ def learn_from(observations: Observations, diagnosis: Diagnosis) -> Learnt:
     depression = np.degrees(np.arcsin(np.clip(used.poses.R_nc[:, 2, 2], -1, 1)))
     height = used.plane_down - used.poses.p_nc[:, 2]
     calibration, gain = diagnosis.calibration, diagnosis.winner.gain
-    parameters, scales = [], []
-    for one in calibration.names if diagnosis.counts else ():
-        unit = UNITS[one]
-        scale = _SCALES.get(unit, 1.0)
-        low, high = calibration.interval(one)
-        parameters.append(
-            LearntParameter(
-                name=one, value=scale * calibration.value(one), low=scale * low, high=scale * high, unit=unit
-            )
-        )
-        scales.append(scale)
+    told = corrections(calibration) if diagnosis.counts else []
+    scales = [_SCALES.get(one["unit"], 1.0) for one in told]
     covariance = calibration.covariance * np.outer(scales, scales) if scales else np.zeros((0, 0))
     return Learnt(
         learnt_on=LearntOn(
@@ -430,7 +428,7 @@ def learn_from(observations: Observations, diagnosis: Diagnosis) -> Learnt:
         if diagnosis.counts
         else None,
         covariance=tuple(tuple(map(float, row)) for row in covariance),
-        parameter=tuple(parameters),
+        parameter=tuple(LearntParameter(**one) for one in told),
     )
 
 
@@ -571,3 +569,99 @@ def _facts(observations: Observations, learnt: Learnt) -> list[Fact]:
 
 def _range(values: np.ndarray) -> tuple[float, float]:
     return float(np.nanmin(values)), float(np.nanmax(values))
+
+
+#: A camera or a track slower than this has no direction (m/s), and a view nearer to straight down than this
+#: share of its height neither.
+SLOWEST_M_S = 1.0
+STEEPEST = 0.05
+
+
+def axes_of(observations: Observations, scored: pd.DataFrame) -> dict[str, Array]:
+    """Unit vectors (N, 2), north-east, of the axes that a scored table's errors are split along.
+
+    Parameters
+    ----------
+    observations
+        Those that the table was made from.
+    scored
+        From `score_points`, N rows.
+
+    Returns
+    -------
+    dict
+        ``north``, ``east``; ``away from the camera`` and ``to the right of the line of sight``, on the
+        ground; where the poses have times, ``along the course`` and ``to the right of the course``. NaN where
+        a point has no such axis.
+    """
+    rows = pd.Index(observations.table["detection_id"]).get_indexer(pd.Index(scored["detection_id"]))
+    camera = observations.poses.p_nc[rows]
+    sight = scored[["north_m", "east_m"]].to_numpy(float) - camera[:, :2]
+    drop = observations.plane_down[rows] - camera[:, 2]
+    away = _unit(sight, STEEPEST * np.abs(drop))
+    one = np.ones(len(scored))
+    axes = {
+        "north": np.column_stack([one, 0 * one]),
+        "east": np.column_stack([0 * one, one]),
+        "away from the camera": away,
+        "to the right of the line of sight": _right(away),
+    }
+    flight = observations.flight
+    nav = flight.nav[observations.source]
+    if flight.timed and "frame_id" not in nav:
+        times = scored["time_s"].to_numpy(float)
+        after, before = (poses_at(nav, times + shift)[0][:, :2] for shift in (0.5, -0.5))
+        track = _unit(after - before, np.full(len(times), SLOWEST_M_S))
+        if np.isfinite(track).any():
+            axes |= {"along the course": track, "to the right of the course": _right(track)}
+    return axes
+
+
+def _unit(vectors: Array, least: Array) -> Array:
+    length = np.hypot(*vectors.T)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.where((length > least)[:, None], vectors / length[:, None], np.nan)
+
+
+def _right(axis: Array) -> Array:
+    """A quarter turn clockwise, seen from above (north, east)."""
+    return np.column_stack([-axis[:, 1], axis[:, 0]])
+
+
+#: How far headings may lie from their mean, rad, for a flight on one heading: a turned camera and a shifted
+#: position then move all points alike.
+ONE_HEADING = np.radians(45.0)
+
+
+def on_one_heading(observations: Observations) -> bool:
+    """Whether all images were taken on one heading.
+
+    Parameters
+    ----------
+    observations
+        From `wildlab.analysis.georeference.observe`.
+
+    Returns
+    -------
+    bool
+    """
+    R = observations.poses.R_nb[np.isfinite(observations.poses.R_nb).all(axis=(1, 2))]
+    yaw = matrix_to_euler(R)[:, 2]
+    mean = np.angle(np.exp(1j * yaw).mean()) if len(yaw) else 0.0
+    return bool(len(yaw)) and bool(np.abs(wrap(yaw - mean)).max() <= ONE_HEADING)
+
+
+def visible_error(flight: Flight, scored: pd.DataFrame) -> float:
+    """Half the median spacing of the marks, m: larger errors go to another one, where the nearest counts.
+
+    Parameters
+    ----------
+    flight
+        With truth.
+    scored
+        From `score_points`.
+    """
+    offset = flight.manifest.clocks.truth_offset_s
+    _, places = truth_at(flight.table("truth"), scored["time_s"].to_numpy(float), offset_s=offset)
+    spots = np.nanmedian(places[:, :, :2], axis=1)
+    return largest_visible(spots[np.isfinite(spots).all(axis=1)])

@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wildlab.analysis.plans.coverage import ExecutionErrors
+from wildlab.analysis.plan_coverage import ExecutionErrors
 from wildlab.geometry.camera import Camera, in_image, normalise
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.frames import Array, Indices, Mask
+from wildlab.geometry.frames import Array, Indices, Mask, euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel, pixel_rays
 from wildlab.geometry.terrain import Terrain, intersect_terrain
 from wildlab.geometry.uncertainty import PoseErrors, ground_covariance
@@ -111,9 +111,8 @@ def pose_errors(errors: ExecutionErrors, sd: float, R_nc: Array, headings: Array
     -------
     PoseErrors
     """
-    cos, sin, zero = np.cos(headings), np.sin(headings), np.zeros(len(headings))
     # Columns: the platform's axes in n, ahead, to the right and down.
-    axes = np.stack([cos, -sin, zero, sin, cos, zero, zero, zero, zero + 1], axis=-1).reshape(-1, 3, 3)
+    axes = euler_to_matrix(0.0, 0.0, headings)
     turned = np.swapaxes(R_nc, -1, -2) @ axes * [errors.roll, errors.pitch, errors.yaw]
     pose = np.zeros((len(headings), 6, 6))
     pose[:, range(3), range(3)] = np.square([errors.horizontal, errors.horizontal, errors.vertical])
@@ -228,37 +227,19 @@ def put_on_ground(
     detector: Detector,
     rng: np.random.Generator,
 ) -> tuple[Array, Array]:
-    """Detections (D, 2) m of animals at places (D, 2), and their covariances (D, 2, 2).
+    """Detections (D, 2) m of animals at places (D, 2), and their covariances (D, 2, 2) m^2.
 
-    There is a pose and a heading for each.
+    There is a pose and a heading for each. The covariance takes the ground about a detection as level.
     """
     points = np.column_stack([places, -terrain.heights_at(places) - detector.height])
     uv = ground_to_pixel(true.camera, points, true.p_nc, true.R_nc)
     uv = uv + detector.sd * rng.standard_normal(uv.shape)
-    return to_ground(terrain, nominal, headings, uv, errors, detector, rng)
-
-
-def to_ground(
-    terrain: Terrain,
-    nominal: CameraPoses,
-    headings: Array,
-    uv: Array,
-    errors: ExecutionErrors,
-    detector: Detector,
-    rng: np.random.Generator,
-) -> tuple[Array, Array]:
-    """Pixels (D, 2) of middles of animals as places (D, 2) m and covariances (D, 2, 2) m^2.
-
-    There is a pose and a heading for each. The covariance takes the ground about a detection as level.
-    """
     # Rays from a camera so much lower meet the ground where middles above it are looked at.
     up = np.array([0.0, 0.0, detector.height])
     rays = pixel_rays(nominal.camera, uv, nominal.R_nc)
     met = intersect_terrain(terrain, rays, nominal.p_nc + up).points - up
-    R = ground_covariance(
-        nominal, uv, met[:, 2], pose_errors(errors, detector.sd, nominal.R_nc, headings), rng
-    ).covariance
-    return met[:, :2], R
+    assumed = pose_errors(errors, detector.sd, nominal.R_nc, headings)
+    return met[:, :2], ground_covariance(nominal, uv, met[:, 2], assumed, rng).covariance
 
 
 def footprint_circles(terrain: Terrain, poses: CameraPoses) -> tuple[Array, Array]:
@@ -281,14 +262,7 @@ def footprint_circles(terrain: Terrain, poses: CameraPoses) -> tuple[Array, Arra
     return middle, np.asarray(WIDER * radius + 2 * terrain.step)
 
 
-def sight_from(
-    terrain: Terrain,
-    camera: Camera,
-    p_nc: Array,
-    R_nc: Array,
-    circle: tuple[Array, float],
-    detector: Detector,
-) -> Sight:
+def sight_from(terrain: Terrain, camera: Camera, p_nc: Array, R_nc: Array, detector: Detector) -> Sight:
     """Probability that an image has a detection of an animal at a place, as far as its pose is known.
 
     Parameters
@@ -299,8 +273,6 @@ def sight_from(
         Intrinsic parameters.
     p_nc, R_nc
         (3,) and (3, 3), the pose.
-    circle
-        Middle (2,) m and radius, m, of one that holds the footprint: nothing beyond is asked for.
     detector
         What becomes of an animal in an image.
 
@@ -308,14 +280,9 @@ def sight_from(
     -------
     Sight
     """
-    middle, radius = circle
 
     def sight(places: Array) -> Array:
-        flat = places.reshape(-1, 2)
-        out = np.zeros(len(flat))
-        near = np.flatnonzero(np.hypot(*(flat - middle).T) < radius)
-        if len(near):
-            out[near] = detector.detected * shown(terrain, camera, p_nc, R_nc, flat[near], detector)
-        return out.reshape(places.shape[:-1])
+        seen = shown(terrain, camera, p_nc, R_nc, places, detector)
+        return np.where(seen, detector.detected, 0.0).reshape(places.shape[:-1])
 
     return sight

@@ -24,7 +24,7 @@ from wildlab.analysis.animal_images import (
     sight_from,
     take_images,
 )
-from wildlab.analysis.plans.coverage import ExecutionErrors, displaced, drawn_errors
+from wildlab.analysis.plan_coverage import ExecutionErrors, displaced, drawn_errors
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.covariances import gate_threshold
 from wildlab.geometry.frames import Array, Indices, Mask
@@ -437,7 +437,7 @@ def track_animals(
     steps, k, tells = 0, 0, True
     while k < T:
         steps += 1
-        scan = scan_at(terrain, images, k, (middle[k], float(radius[k])), detector)
+        scan = scan_at(terrain, images, k, detector)
         if detected[k]:
             ledger.take(k, tracker, scan, images.taken(k)[2])
         else:
@@ -448,13 +448,11 @@ def track_animals(
     return TrackedAnimals(known, ledger.found, steps)
 
 
-def scan_at(
-    terrain: Terrain, images: Images, row: int, circle: tuple[Array, float], detector: Detector
-) -> ImageScan:
-    """What one of the images tells tracks; ``circle`` is that of its footprint."""
+def scan_at(terrain: Terrain, images: Images, row: int, detector: Detector) -> ImageScan:
+    """What one of the images tells tracks."""
     z, R, _ = images.taken(row)
     p = images.poses
-    sight = sight_from(terrain, p.camera, p.p_nc[row], p.R_nc[row], circle, detector)
+    sight = sight_from(terrain, p.camera, p.p_nc[row], p.R_nc[row], detector)
     return ImageScan(float(images.times[row]), z, R, sight)
 
 
@@ -640,8 +638,7 @@ def patrol(
             terrain, nominal, true, np.array([heading]), times[row], truth[row], aircraft.errors,
             aircraft.detector, rng,
         )  # fmt: skip
-        middle, radius = footprint_circles(terrain, nominal)
-        scan = scan_at(terrain, images, 0, (middle[0], float(radius[0])), aircraft.detector)
+        scan = scan_at(terrain, images, 0, aircraft.detector)
         ledger.take(k, tracker, scan, images.taken(0)[2])
         if scanned > visits.patience and not tracker.seen_now(goal):
             tracker.give_up(goal)

@@ -1,23 +1,41 @@
-"""A camera out of images of a board: boards found, lens chosen, camera estimated, views compared."""
+"""A camera: its lens out of images of a board, and what to add to the stamps of its images, from points that
+were seen or from their motion.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.analysis import Fact, fact
+from wildlab.analysis.georeference import blocks_of, camera_poses_at, truth_of
 from wildlab.detection.boards import Board, find_board, grey8
+from wildlab.detection.flow import as_grey, image_motion
 from wildlab.errors import WildlabError
 from wildlab.flight.calibration_files import BoardPart, CameraFile, EvidencePart, ParameterPart, ViewPart
+from wildlab.flight.clocks import frame_times
 from wildlab.flight.manifest import CameraPart
+from wildlab.flight.readers.frames import Frame
 from wildlab.flight.readers.frames.image import file_name, read_image
-from wildlab.geometry.frames import Array, Mask
+from wildlab.flight.store import Flight
+from wildlab.geometry.camera import Camera
+from wildlab.geometry.camera_clock import FEWEST as FEWEST_PAIRS
+from wildlab.geometry.camera_clock import (
+    ClockByMotion,
+    ClockByPoints,
+    clock_by_motion,
+    clock_by_points,
+    translation_over_ground,
+)
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.frames import Array, Indices, Mask, matrix_to_rotation_vector
 from wildlab.geometry.intrinsics import (
     FEWEST,
     PINHOLE,
@@ -25,11 +43,10 @@ from wildlab.geometry.intrinsics import (
     LensChoice,
     calibrate_camera,
     choose_lens,
-    confused,
-    direction_sd,
     parameters_of,
     view_errors,
 )
+from wildlab.geometry.mount import camera_rotation
 from wildlab.names import listed
 
 #: A view disagrees where its held-out error is this many times the median, and this many robust standard
@@ -379,17 +396,8 @@ def _refuse_few(images: list[BoardImage], n: int, board: Board) -> None:
 COVERED = 0.8
 #: Fewer views than this give wide intervals.
 PLENTY = 15
-#: What a focal length may be off by at the corner of the image (1 SD) without a word, pixels.
-MATTERS_PX = 0.5
 #: Tilts less than this (degrees) hardly tell focal length from distance.
 FLAT_DEG = 15.0
-#: A direction that is off by more than this (pixels, one standard deviation) at a corner is worth a sentence.
-ROUGH_PX = 2.0
-#: Names as a reader knows them.
-WORDS = {
-    "f": "the focal length", "fx": "the focal length of columns", "fy": "the focal length of rows",
-    "cx": "the principal point's column", "cy": "the principal point's row",
-}  # fmt: skip
 
 
 def _boards(found: CameraCalibration) -> Fact:
@@ -425,55 +433,6 @@ def _covered(found: CameraCalibration) -> Fact:
     return fact(key, share=f"{100 * held.mean():.0f}", worst=worst, least=f"{100 * shares[worst]:.0f}")
 
 
-def _directions(found: CameraCalibration) -> Fact:
-    """How well directions are known in the middle and at the worst corner."""
-    w, h = found.width, found.height
-    places = {"the middle": (w / 2, h / 2)} | {
-        f"the {row} {column} corner": (u, v)
-        for row, v in (("upper", 0.0), ("lower", h - 1.0))
-        for column, u in (("left", 0.0), ("right", w - 1.0))
-    }
-    sd = dict(zip(places, direction_sd(found.found, np.array(list(places.values()))), strict=True))
-    if blind := [name for name, one in sd.items() if not np.isfinite(one)]:
-        return fact("camera-folds", places=" and ".join(blind))
-    worst = max(sd, key=lambda name: sd[name])
-    kind = "even" if worst == "the middle" else "rough" if sd[worst] > ROUGH_PX else "corner"
-    return fact(f"camera-{kind}", middle=f"{sd['the middle']:.1f}", worst=f"{sd[worst]:.1f}", place=worst)
-
-
-def tilts_deg(found: Intrinsics) -> Array:
-    """By how much the board is tilted against the image in each view, (V,) degrees."""
-    return np.degrees(np.arccos(np.clip(np.abs(found.views.rotation[:, 2, 2]), 0, 1)))
-
-
-def rim_px(found: Intrinsics) -> float:
-    """By how much the least certain focal length moves a point at the corner of the image, 1 SD, pixels."""
-    sd = np.sqrt(np.diag(found.covariance))
-    focal = [name in ("f", "fx", "fy") for name in found.names]
-    share = float(np.max(sd[focal] / found.values[focal], initial=0.0))
-    return float(share * np.hypot(found.camera.width, found.camera.height) / 2)
-
-
-def _confused(found: CameraCalibration) -> list[Fact]:
-    """Which parameters the views cannot tell apart, and what would help."""
-    tilt, facts = f"{tilts_deg(found.found).max():.0f}", []
-    for group in confused(found.found):
-        names = listed([WORDS.get(one, one) for one in group])
-        kind = "edges"
-        if set(group) <= {"k1", "k2", "k3"}:
-            kind = "lens"
-        elif set(group) & {"f", "fx", "fy"}:
-            # Two focal lengths change together wherever the board stands; it matters where both are vague.
-            if rim_px(found.found) < MATTERS_PX:
-                continue
-            kind = "tilt"
-        lens = "k1" if "k3" not in group else "k1-k2"
-        facts.append(fact(f"camera-confused-{kind}", names=names, tilt=tilt, lens=lens))
-    if tilts_deg(found.found).max() < FLAT_DEG:
-        facts.append(fact("camera-flat", tilt=tilt))
-    return facts
-
-
 def _odd(found: CameraCalibration) -> list[Fact]:
     """Views that disagree with the rest, and what becomes of the estimate without them."""
     rest = found.without_odd
@@ -485,7 +444,7 @@ def _odd(found: CameraCalibration) -> list[Fact]:
     moved = ", ".join(
         f"{name} {found.found.value(name):.1f} -> {rest.value(name):.1f}"
         for name in found.found.names
-        if name in WORDS
+        if name in (*PINHOLE, "f")
     )
     option = " ".join(f"--without {name}" for name in found.odd)
     return [
@@ -497,6 +456,258 @@ def _odd(found: CameraCalibration) -> list[Fact]:
 
 def facts_of(found: CameraCalibration) -> list[Fact]:
     """All that is said of a calibration, in order; its words are in ``data/messages/en/terminal.toml``."""
-    few = [fact("camera-few", views=len(found.views), plenty=PLENTY)] if len(found.views) < PLENTY else []
-    first = [_boards(found), _fit(found), _covered(found), _directions(found)]
-    return [*first, *_confused(found), *_odd(found), *few]
+    said = [_boards(found), _fit(found), _covered(found)]
+    tilted = np.degrees(np.arccos(np.clip(np.abs(found.found.views.rotation[:, 2, 2]), 0, 1))).max()
+    if tilted < FLAT_DEG:
+        said.append(fact("camera-flat", tilt=f"{tilted:.0f}"))
+    said += _odd(found)
+    if len(found.views) < PLENTY:
+        said.append(fact("camera-few", views=len(found.views), plenty=PLENTY))
+    return said
+
+
+#: Images further apart in time (s) are not compared: between them the camera may have turned to and fro.
+LONGEST_PAIR_S = 1.0
+
+
+def refuse_without_clock(flight: Flight, source: str | None = None) -> None:
+    """Refuse a flight whose images have no clock of their own.
+
+    Raises
+    ------
+    WildlabError
+        Where its times merely number the images, or its poses belong to images by name.
+    """
+    if not flight.timed:
+        raise WildlabError(
+            "the images carry no time, so there is no clock to estimate",
+            "import with times if the images have any",
+            file=flight.folder,
+            field="time.kind",
+        )
+    name, nav = flight.pose_source(source)
+    if "frame_id" in nav:
+        raise WildlabError(
+            "these poses belong to images by name, whatever their clock says",
+            "choose other poses with --source, if there are any",
+            file=flight.folder,
+            field=f"nav/{name}",
+        )
+
+
+def clock_from_points(flight: Flight, source: str | None = None) -> CameraClock:
+    """What to add to the stamps of the images so that known points appear where they were seen.
+
+    Parameters
+    ----------
+    flight
+        With frames, poses, pixel detections that name targets, and truth of these.
+    source
+        Name of the ``nav`` table; may be left out where there is one beside the truth's.
+
+    Raises
+    ------
+    WildlabError
+        Where the images have no clock, or fewer than four sightings have a pose.
+    """
+    refuse_without_clock(flight, source)
+    frames, pixels, truth = flight.table("frames"), flight.detections, flight.truth
+    if pixels is None or truth is None or "target_id" not in pixels:
+        pixels = pd.DataFrame()
+    else:
+        known = pixels["target_id"].isin(truth["target_id"]) & pixels["frame_id"].isin(frames["frame_id"])
+        pixels = pixels[(pixels["kind"] == "pixel") & known].reset_index(drop=True)
+    if len(pixels) < 4:
+        raise WildlabError(
+            f"{len(pixels)} detections are of a target whose position is known, at least 4 are needed",
+            "name the targets of detections and add their truth, or give the images with --images",
+            file=flight.folder,
+            field="detections",
+        )
+    at = flight.frame_rows(pixels["frame_id"])
+    times = frame_times(flight)[at]
+    table = pd.DataFrame({"target_id": pixels["target_id"].to_numpy(object), "frame_id": pixels["frame_id"]})
+
+    def seen_at(offset: float) -> tuple[CameraPoses, Array]:
+        poses = camera_poses_at(flight, times + offset, source)
+        if "pan_rad" in frames:
+            pan, tilt = frames[["pan_rad", "tilt_rad"]].to_numpy(float)[at].T
+            poses = replace(poses, pan=pan, tilt=tilt)
+        return poses, truth_of(flight, table.assign(time_s=times + offset))
+
+    found = clock_by_points(
+        seen_at,
+        pixels[["u_px", "v_px"]].to_numpy(float),
+        pixels["frame_id"].to_numpy(object),
+        blocks_of(flight, table.assign(time_s=times)),
+    )
+    if found is None:
+        raise WildlabError(
+            "fewer than four sightings of known points have a pose, with any offset of the camera's clock",
+            "check that images and poses are of the same time: wildlab check says what overlaps",
+            file=flight.folder,
+            field="detections",
+        )
+    rests = {"points": found.points, "images": found.images, "blocks": found.draws}
+    return _told(flight, "points", found, rests, {"cost": found.cost})
+
+
+def image_motions(frames: Iterable[Frame], flight: Flight, camera: Camera) -> tuple[Indices, Array]:
+    """How the scene moved from each image of a flight to the next that follows it closely.
+
+    Parameters
+    ----------
+    frames
+        Images in any order of names that the flight's frames have: by file name, with or without its ending.
+    flight
+        With frames.
+    camera
+        Its lens.
+
+    Returns
+    -------
+    (pairs, motion)
+        (N, 2) rows of the table ``frames``, and (N, 3) as from `image_motion`.
+    """
+    names = flight.table("frames")["frame_id"].astype(str)
+    rows = {name: number for number, name in enumerate(names)}
+    for number, name in enumerate(names):
+        rows.setdefault(Path(name).stem, number)
+    stamps = flight.table("frames")["time_s"].to_numpy(float)
+    pairs: list[tuple[int, int]] = []
+    motion: list[Array] = []
+    before: tuple[int, NDArray[np.uint8], Mask] | None = None
+    for frame in frames:
+        row = rows.get(frame.name, rows.get(Path(frame.name).stem))
+        if row is None or not frame.usable:
+            before = None
+            continue
+        grey = as_grey(frame.image, frame.valid)
+        if before is not None and before[1].shape == grey.shape:
+            apart = stamps[row] - stamps[before[0]]
+            if 0 < apart <= LONGEST_PAIR_S:
+                pairs.append((before[0], row))
+                motion.append(image_motion(before[1], grey, camera, before[2]))
+        before = row, grey, frame.valid
+    return np.array(pairs, np.intp).reshape(-1, 2), np.array(motion, float).reshape(-1, 3)
+
+
+def clock_from_motions(
+    flight: Flight, pairs: Indices, motion: Array, source: str | None = None
+) -> CameraClock:
+    """What to add to the stamps of the images so that they moved as the log says that the camera turned.
+
+    Parameters
+    ----------
+    flight
+        With frames and poses; gyros are used where it has them and the camera is fixed to the airframe.
+    pairs, motion
+        From `image_motions`.
+    source
+        Name of the ``nav`` table; may be left out where there is one beside the truth's.
+
+    Raises
+    ------
+    WildlabError
+        Where the images have no clock, or too few of them could be followed within the log.
+    """
+    refuse_without_clock(flight, source)
+    times, turned, moved = _camera_motion(flight, source)
+    spans = frame_times(flight)[pairs].reshape(-1, 2)
+    found = clock_by_motion(spans, motion, times, turned, moved)
+    if found is None:
+        followed = int(np.isfinite(motion).all(axis=1).sum())
+        raise WildlabError(
+            f"{followed} of {len(pairs)} pairs of images that follow each other within {LONGEST_PAIR_S:g} s "
+            f"could be followed, and {FEWEST_PAIRS} within the log are needed",
+            "give more images of a stretch in which the camera turns, or state the offset",
+            file=flight.folder,
+            field="frames",
+        )
+    rests = {"pairs": found.pairs, "correlation": found.peak, "rival_correlation": found.rival_correlation}
+    curve = {"correlation": found.correlation}
+    return _told(flight, "motion", found, rests | {"gain": found.gain}, curve)
+
+
+def clock_from_images(flight: Flight, frames: Iterable[Frame], source: str | None = None) -> CameraClock:
+    """`clock_from_motions` of images.
+
+    Raises
+    ------
+    WildlabError
+        As that.
+    """
+    refuse_without_clock(flight, source)
+    pairs, motion = image_motions(frames, flight, flight.manifest.geometry_camera())
+    return clock_from_motions(flight, pairs, motion, source)
+
+
+def _camera_motion(flight: Flight, source: str | None) -> tuple[Array, Array, Array]:
+    """Times (T,), and integrals (T, 3) of the camera's angular velocity in c and of what its travel shows."""
+    _, nav = flight.pose_source(source)
+    t = nav["time_s"].to_numpy(float)
+    poses = camera_poses_at(flight, t, source)
+    good = np.isfinite(poses.p_nc).all(axis=1) & np.isfinite(poses.R_nc).all(axis=(1, 2))
+    t, p, R = t[good], poses.p_nc[good], poses.R_nc[good]
+    if len(t) < 2:
+        raise WildlabError(
+            "the poses are too few to tell how the camera turned", "import more of the log", field="nav"
+        )
+    steps = matrix_to_rotation_vector(np.einsum("nji,njk->nik", R[:-1], R[1:]))
+    turned = np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
+    moved = translation_over_ground(p, R)
+    if flight.imu is None or flight.gimbal is not None or "pan_rad" in flight.table("frames"):
+        return t, turned, moved
+    imu = flight.imu
+    rates = imu[["w_x_rad_s", "w_y_rad_s", "w_z_rad_s"]].to_numpy(float)
+    at = imu["time_s"].to_numpy(float)
+    known = np.isfinite(rates).all(axis=1) & (at >= t[0]) & (at <= t[-1])
+    known &= np.diff(np.fmax.accumulate(at), prepend=-np.inf) > 0
+    if known.sum() < len(t):
+        return t, turned, moved
+    at, rates = at[known], rates[known] @ camera_rotation(flight.manifest.geometry_mount())
+    between = (rates[1:] + rates[:-1]) / 2 * np.diff(at)[:, None]
+    by_gyro = np.vstack([np.zeros(3), np.cumsum(between, axis=0)])
+    return at, by_gyro, np.stack([np.interp(at, t, one) for one in moved.T], axis=1)
+
+
+class CameraClock(NamedTuple):
+    """What to add to the stamps of the images, as ``clocks.camera_offset_s`` has it: not on top of that.
+
+    Attributes
+    ----------
+    numbers
+        ``offset_s``, ``sd_s``, ``certain``, ``method``, the next best offset
+        ``rival_s`` and what the estimate rests on.
+    curve
+        ``offset_s``, and ``cost`` or ``correlation``.
+    facts
+        What is said of it; the words are in ``data/messages/en/terminal.toml``.
+    """
+
+    numbers: dict[str, object]
+    curve: pd.DataFrame
+    facts: tuple[Fact, ...]
+
+
+def _told(
+    flight: Flight,
+    way: str,
+    found: ClockByPoints | ClockByMotion,
+    rests: Mapping[str, float],
+    curve: dict[str, Array],
+) -> CameraClock:
+    stated = flight.manifest.clocks.camera_offset_s
+    offset_s, rival_s = found.offset_s + stated, found.rival_s + stated
+    numbers: dict[str, object] = {
+        "offset_s": offset_s,
+        "sd_s": found.sd_s,
+        "certain": found.certain,
+        "method": {"points": "known points", "motion": "image motion"}[way],
+        "rival_s": rival_s,
+        **rests,
+    }
+    shown = {name: f"{one:.2f}" if isinstance(one, float) else str(one) for name, one in rests.items()}
+    shown |= {"offset_s": f"{offset_s:+.3f}", "rival_s": f"{rival_s:+.3f}", "sd_s": f"{found.sd_s:.3f}"}
+    said = fact(f"clock-{way}-{'certain' if found.certain else 'open'}", **shown)
+    return CameraClock(numbers, pd.DataFrame({"offset_s": found.offsets + stated} | curve), (said,))

@@ -20,10 +20,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from wildlab.analysis.evaluate import blocks_of, known_points
 from wildlab.analysis.georeference import (
     Observations,
+    blocks_of,
     covariances_of,
+    known_points,
     pose_errors,
     shifting_poses,
     truth_of,

@@ -1,4 +1,6 @@
-"""A flight's detections as points on the ground, each with its covariance, and as files for maps."""
+"""A flight's detections as points on the ground, each with its covariance, as files for maps, and against
+surveyed truth.
+"""
 
 from __future__ import annotations
 
@@ -7,21 +9,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from wildlab.analysis import Fact, fact
 from wildlab.errors import WildlabError
+from wildlab.evaluation.intervals import time_blocks
 from wildlab.files import write_atomic, write_csv
 from wildlab.flight.clocks import between, frame_times, gimbal_angles, pose_finder, poses_at, truth_at
 from wildlab.flight.store import Flight
 from wildlab.geometry.attitude_uncertainty import pose_covariance
 from wildlab.geometry.calibration import Calibration, PosesAt, calibrated_poses
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.covariances import ellipse_axes
-from wildlab.geometry.frames import Array, Mask, ned_to_geodetic
+from wildlab.geometry.covariances import ellipse_axes, inside_ellipse
+from wildlab.geometry.frames import Array, Indices, Mask, ned_to_geodetic
 from wildlab.geometry.georeference import RAY_STATUS, georeference_pixels
 from wildlab.geometry.terrain import Terrain, pixels_to_terrain
 from wildlab.geometry.uncertainty import PoseErrors, ground_covariance, terrain_covariance
@@ -59,8 +61,6 @@ class Observations:
         point where the ray meets it.
     terrain
         The flight's, where it has one.
-    level
-        Over terrain, what `plane_down` would be without it, (N,).
     """
 
     flight: Flight
@@ -70,7 +70,6 @@ class Observations:
     poses: CameraPoses
     plane_down: Array
     terrain: Terrain | None = None
-    level: Array | None = None
 
     def take(self, rows: Mask) -> Observations:
         """The observations of some rows."""
@@ -80,7 +79,6 @@ class Observations:
             uv=self.uv[rows],
             poses=self.poses.take(rows),
             plane_down=self.plane_down[rows],
-            level=None if self.level is None else self.level[rows],
         )
 
     def of(self, scored: pd.DataFrame) -> Observations:
@@ -143,7 +141,7 @@ def observe(
             field="detections",
         )
     name, nav = flight.pose_source(source)
-    at = pd.Index(frames["frame_id"]).get_indexer(pd.Index(pixels["frame_id"]))
+    at = flight.frame_rows(pixels["frame_id"])
     own_clock = frames[stamps].to_numpy(float) - frames["time_s"].to_numpy(float)
     times = (frame_times(flight) + own_clock + clock_shift)[at]
     p_nb, R_nb, covariance = poses_at(nav, times, pixels["frame_id"])
@@ -161,16 +159,14 @@ def observe(
     )
     manifest = flight.manifest
     mount = manifest.geometry_mount(name)
-    level = _ground_heights(flight, table, pixels)
     seen = Observations(
         flight,
         name,
         table,
         pixels[["u_px", "v_px"]].to_numpy(float),
         CameraPoses(manifest.geometry_camera(), mount, p_nb, R_nb, pan, tilt, covariance),
-        level,
+        _ground_heights(flight, table, pixels),
         flight.terrain,
-        None if flight.terrain is None else level,
     )
     return _grounded(seen)
 
@@ -348,21 +344,12 @@ def truth_of(flight: Flight, table: pd.DataFrame) -> Array:
     -------
     (N, 3) m
     """
-    where = np.full((len(table), 3), np.nan)
-    if flight.truth is None:
-        return where
-    names = table["target_id"].to_numpy(object)
-    times = table["time_s"].to_numpy(float)
-    still = flight.truth[flight.truth["time_s"].isna()].drop_duplicates("target_id")
-    at = pd.Index(still["target_id"]).get_indexer(pd.Index(names))
-    where[at >= 0] = still[["north_m", "east_m", "down_m"]].to_numpy(float)[at[at >= 0]]
-    moving = flight.truth[flight.truth["time_s"].notna()]
-    tracks = dict(tuple(moving.groupby("target_id", sort=False)))
-    offset = flight.manifest.clocks.truth_offset_s
-    for target in set(names) & tracks.keys():
-        rows = names == target
-        where[rows] = truth_at(tracks[target], times[rows], offset_s=offset)[1][0]
-    return where
+    if flight.truth is None or flight.truth.empty:
+        return np.full((len(table), 3), np.nan)
+    times, offset = table["time_s"].to_numpy(float), flight.manifest.clocks.truth_offset_s
+    targets, where = truth_at(flight.truth, times, offset)
+    at = pd.Index(targets).get_indexer(pd.Index(table["target_id"]))
+    return np.where((at >= 0)[:, None], where[at, np.arange(len(at))], np.nan)
 
 
 def _ground_heights(flight: Flight, table: pd.DataFrame, pixels: pd.DataFrame) -> Array:
@@ -372,66 +359,13 @@ def _ground_heights(flight: Flight, table: pd.DataFrame, pixels: pd.DataFrame) -
     return np.where(np.isnan(of_target), pixels["plane_down_m"].to_numpy(float), of_target)
 
 
-class Shift(NamedTuple):
-    """How far points on terrain lie from those on a level plane, metres, horizontally.
-
-    Attributes
-    ----------
-    n
-        How many points are on both.
-    median, largest
-        Of the distances; NaN where there is none.
-    """
-
-    n: int
-    median: float
-    largest: float
-
-
-def level_of(observations: Observations) -> Array:
-    """Down coordinate (N,) of the plane that would serve without terrain: as stated, else under the lens."""
-    ground: Terrain | None = observations.terrain
-    if ground is None or observations.level is None:
-        return observations.plane_down
-    p_nc = np.broadcast_to(observations.poses.p_nc, (len(observations.uv), 3))
-    under = -ground.heights_at(p_nc[:, :2])
-    return np.where(np.isfinite(observations.level), observations.level, under)
-
-
-def on_level(observations: Observations) -> Observations:
-    """The same observations as they would be without terrain."""
-    return replace(observations, plane_down=level_of(observations), terrain=None, level=None)
-
-
-def shift_from_level(observations: Observations, points: pd.DataFrame) -> Shift:
-    """How far points lie from where a level plane would have put them.
-
-    Parameters
-    ----------
-    observations
-        Of a flight with terrain.
-    points
-        From `wildlab.analysis.georeference.georeference`, of these.
-
-    Returns
-    -------
-    Shift
-    """
-    level = georeference_pixels(observations.poses, observations.uv, level_of(observations))[:, :2]
-    off = np.linalg.norm(points[["north_m", "east_m"]].to_numpy(float) - level, axis=1)
-    off = off[np.isfinite(off)]
-    if not len(off):
-        return Shift(0, float("nan"), float("nan"))
-    return Shift(len(off), float(np.median(off)), float(off.max()))
-
-
 def ground_facts(observations: Observations, points: pd.DataFrame) -> list[Fact]:
-    """What the points lie on, what became of the rays, and what a plane would have given.
+    """What the points lie on, and what became of the rays.
 
     Parameters
     ----------
     observations, points
-        As for `shift_from_level`; without terrain there is less to say.
+        What was put on the ground, and where it lies.
 
     Returns
     -------
@@ -442,19 +376,7 @@ def ground_facts(observations: Observations, points: pd.DataFrame) -> list[Fact]
     if observations.terrain is None:
         return [fact("ground-level", placed=placed, of=of)]
     became = "; ".join(f"{n} {words}" for words, n in points["ray"].value_counts().items())
-    found = [fact("ground-terrain", of=of, became=became or "none")]
-    shift = shift_from_level(observations, points)
-    if shift.n:
-        median, largest = f"{shift.median:.2f}", f"{shift.largest:.2f}"
-        found.append(fact("ground-shift", n=shift.n, median=median, largest=largest))
-    kinds = points["ellipse"].value_counts()
-    sampled, split, unbounded = (int(kinds.get(name, 0)) for name in ("sampled", "split", "unbounded"))
-    if sampled + split:
-        key = "ground-split" if split else "ground-sampled"
-        found.append(fact(key, sampled=sampled + split, split=split, placed=placed))
-    if unbounded:
-        found.append(fact("ground-unbounded", unbounded=unbounded, placed=placed))
-    return found
+    return [fact("ground-terrain", of=of, became=became or "none")]
 
 
 #: What is written, by the end of the name.
@@ -586,3 +508,152 @@ def _rings(placed: pd.DataFrame) -> Array:
     east = along * np.sin(bearing) + across * np.cos(bearing)
     middle = placed[["north_m", "east_m", "down_m"]].to_numpy(float)[:, None, :]
     return middle + np.stack([north, east, np.zeros_like(north)], axis=2)
+
+
+def score_points(flight: Flight, points: pd.DataFrame) -> pd.DataFrame:
+    """Errors of ground points against the truth, by the flight's scoring rule.
+
+    ``labelled``: the target that the detection names; points without one are left out. ``nearest``: the
+    target nearest to the point, horizontally, among those whose position is known at that time.
+
+    Parameters
+    ----------
+    flight
+        With truth.
+    points
+        From `wildlab.analysis.georeference.georeference`.
+
+    Returns
+    -------
+    DataFrame
+        The points that can be judged, with ``truth_id``, ``error_north_m``, ``error_east_m``, ``error_m``
+        (NaN where the ray missed the ground) and ``inside_90`` (whether the truth lies in the 90 % ellipse;
+        NaN where there is no ellipse).
+
+    Raises
+    ------
+    WildlabError
+        Where the flight has no truth, or none of its points can be judged.
+
+    Examples
+    --------
+    >>> from wildlab.analysis.georeference import georeference, observe
+    >>> from wildlab.simulation.twins import simulate_twin
+    >>> flight = simulate_twin("large-ship", 1)
+    >>> points = georeference(observe(flight, "truth"), np.random.default_rng(0))
+    >>> bool(score_points(flight, points)["error_m"].median() < 20)
+    True
+    """
+    truth = flight.table("truth")
+    xy = points[["north_m", "east_m"]].to_numpy(float)
+    if flight.manifest.scoring.rule == "labelled":
+        where, names = truth_of(flight, points), points["target_id"].to_numpy(str)
+    else:
+        offset = flight.manifest.clocks.truth_offset_s
+        targets, positions = truth_at(truth, points["time_s"].to_numpy(float), offset_s=offset)
+        distance = np.linalg.norm(positions[:, :, :2] - xy, axis=2)
+        nearest = np.where(np.isnan(distance), np.inf, distance).argmin(axis=0)
+        where, names = positions[nearest, np.arange(len(points))], np.asarray(targets)[nearest]
+    known = np.isfinite(where[:, :2]).all(axis=1)
+    if not known.any():
+        raise WildlabError(
+            "no detection can be compared with the truth",
+            "name the targets in the detections' target_id, or set the scoring rule to 'nearest'",
+            file=flight.folder,
+            field="detections.target_id",
+        )
+    error = (xy - where[:, :2])[known]
+    scored = points.iloc[np.flatnonzero(known)]
+    covariance = covariances_of(scored)
+    inside = inside_ellipse(error, covariance).astype(float)
+    inside[~np.isfinite(covariance).all(axis=(1, 2))] = np.nan
+    scored = scored.assign(
+        truth_id=names[known],
+        error_north_m=error[:, 0],
+        error_east_m=error[:, 1],
+        error_m=np.hypot(*error.T),
+        inside_90=inside,
+    )
+    return scored.reset_index(drop=True)
+
+
+def errors_of(scored: pd.DataFrame) -> Array:
+    """The errors (N, 2) north-east of a scored table.
+
+    Parameters
+    ----------
+    scored
+        From `score_points`.
+
+    Returns
+    -------
+    (N, 2) m, point minus truth
+
+    Examples
+    --------
+    >>> errors_of(pd.DataFrame({"error_north_m": [1.0], "error_east_m": [2.0]})).tolist()
+    [[1.0, 2.0]]
+    """
+    return scored[["error_north_m", "error_east_m"]].to_numpy(float)
+
+
+def recorded_answers(flight: Flight) -> tuple[dict[str, pd.DataFrame], list[str]]:
+    """Positions that other programs gave for the same detections, scored like ours.
+
+    Parameters
+    ----------
+    flight
+        With detections of the kind ``position``, and truth.
+
+    Returns
+    -------
+    answers, unlabelled
+        Scored tables by program; and the programs that name no target with a truth where they have to.
+    """
+    detections, frames = flight.table("detections"), flight.table("frames")
+    answers, unlabelled = dict[str, pd.DataFrame](), list[str]()
+    for program, rows in detections[detections["kind"] == "position"].groupby("source", sort=False):
+        names = rows["target_id"].fillna("") if "target_id" in rows else pd.Series("", rows.index)
+        known = names.isin(set(flight.table("truth")["target_id"]))
+        if flight.manifest.scoring.rule == "labelled" and not known.any():
+            unlabelled.append(str(program))
+            continue
+        at = flight.frame_rows(rows["frame_id"])
+        points = rows[["detection_id", "frame_id", "north_m", "east_m"]].assign(
+            target_id=names, time_s=frames["time_s"].to_numpy(float)[at],
+            cov_nn=np.nan, cov_ne=np.nan, cov_ee=np.nan,
+        )  # fmt: skip
+        answers[str(program)] = score_points(flight, points.reset_index(drop=True))
+    return answers, unlabelled
+
+
+def blocks_of(flight: Flight, table: pd.DataFrame) -> Indices:
+    """Which block in time order (N,) each point belongs to: see `wildlab.evaluation.intervals.time_blocks`.
+
+    Parameters
+    ----------
+    flight
+        Says whether its times are times, or merely number the images.
+    table
+        With ``frame_id`` and ``time_s``, N rows.
+
+    Returns
+    -------
+    (N,) integers from 0
+    """
+    times = table["time_s"].to_numpy(float)
+    if flight.timed and np.isfinite(times).all():
+        return time_blocks(times, seconds=True)
+    place = flight.frame_rows(table["frame_id"])
+    return time_blocks(place, seconds=False)
+
+
+def known_points(observations: Observations, scored: pd.DataFrame) -> tuple[Observations, Array]:
+    """The observations that were scored, and the points (N, 3) they should have met.
+
+    North and east are those of the truth, down is the ground that the ray was cut with.
+    """
+    chosen = observations.of(scored)
+    names = scored.set_index("detection_id").loc[chosen.table["detection_id"], "truth_id"].to_numpy()
+    where = truth_of(chosen.flight, chosen.table.assign(target_id=names))
+    return chosen, np.column_stack([where[:, :2], chosen.plane_down])

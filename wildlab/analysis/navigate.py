@@ -213,14 +213,10 @@ def _velocities(gnss: pd.DataFrame, times: Array) -> Array:
 
 
 def _levers(flight: Flight, gnss: pd.DataFrame) -> list[Array]:
-    """From b to the first antenna and to the second one, (3,) m in b each."""
-    return [_lever(flight, gnss, LEVER_COLUMNS[:3]), _lever(flight, gnss, LEVER_COLUMNS[3:])]
-
-
-def _lever(flight: Flight, gnss: pd.DataFrame, columns: tuple[str, ...]) -> Array:
-    if set(columns) <= set(gnss.columns):
-        return gnss[list(columns)].iloc[0].to_numpy(float)
-    return np.array(flight.manifest.gnss.lever_arm_m)
+    """From b to the first antenna and to the second one, (3,) m in b each: logged, else stated."""
+    stated = np.array(flight.manifest.gnss.lever_arm_m)
+    both = (list(LEVER_COLUMNS[:3]), list(LEVER_COLUMNS[3:]))
+    return [gnss[one].iloc[0].to_numpy(float) if {*one} <= {*gnss} else stated for one in both]
 
 
 def samples_of(flight: Flight) -> ImuSamples:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from enum import StrEnum
 from typing import Any, NamedTuple
 
-from wildlab.analysis.overview import Overview
+from wildlab.analysis.overview import Gain, Overview
 from wildlab.evaluation.ellipses import is_conservative, is_overconfident
 from wildlab.evaluation.intervals import Interval
 
@@ -182,34 +182,6 @@ CAUSES = {
 }
 
 
-class Gain(NamedTuple):
-    """One thing to fix.
-
-    Attributes
-    ----------
-    key
-        ``cause``, ``far_out``, or what is lost: `wildlab.analysis.image_coverage.Recovered`.
-    causes
-        Of a constant error, which; else empty.
-    value, of
-        What is gained, metres or how many, and of how many metres, or of how many.
-    share
-        Of the error or of the data.
-    what
-        What is lost.
-    why
-        What is known of the reason, as a clause; may be empty.
-    """
-
-    key: str
-    causes: tuple[str, ...]
-    value: float
-    of: float
-    share: float
-    what: str = ""
-    why: str = ""
-
-
 def numbers_of(documents: Iterable[Mapping[str, Any]]) -> dict[tuple[str, str], Mapping[str, Any]]:
     """Numbers of ``metrics.json`` documents by name and subject; the first of equal ones.
 
@@ -274,56 +246,32 @@ def gains_of(overview: Overview, numbers: Numbers) -> list[Gain]:
     -------
     list of Gain
     """
-    data = (Gain(one.key, (), one.lost, one.of, one.share, one.what, one.why) for one in overview.lost)
-    found = [*metric_gains(numbers), *data]
+    found = [*metric_gains(numbers), *overview.lost]
     return sorted((one for one in found if one.share >= LISTED), key=lambda one: -one.share)
 
 
 def metric_gains(numbers: Numbers) -> Iterable[Gain]:
     """What taking errors off gains, metres; parameters as of `gains_of`."""
-    gain, left = numbers.get(("gain", "winner")), error_left(numbers)
-    if gain is not None and left is not None and _known(gain["value"]):
-        before = gain["value"] + left
-        causes = causes_told(numbers)
-        yield Gain("cause", causes, gain["value"], before, gain["value"] / before if before > 0 else 0.0)
-    far = numbers.get(("gain", "without-far-out"))
-    rest = numbers.get(("horizontal_error_mean", "without-far-out"))
-    points = numbers.get(("points_far_out", "winner"))
-    if far and rest and points and _known(far["value"], rest["value"], points["value"]):
-        before = far["value"] + rest["value"]
-        share = far["value"] / before if before > 0 else 0.0
+    gain, points = number_of(numbers, "gain", "winner"), numbers.get(("points_far_out", "winner"))
+    # Of the points that the gain is of: without those that are far out, where some are.
+    far, kept = (number_of(numbers, one, "without-far-out") for one in ("gain", "horizontal_error_mean"))
+    left = number_of(numbers, "horizontal_error_mean", "calibrated-pose")
+    left = kept if math.isfinite(kept + left) else left
+    if math.isfinite(gain + left):
+        yield Gain("cause", causes_told(numbers), gain, gain + left, _share(gain, gain + left))
+    if points and points["value"] is not None and math.isfinite(far + kept):
         why = f"{points['value']:.0f} of {points['n']} points"
-        yield Gain("far_out", (), far["value"], before, share, why=why)
+        yield Gain("far_out", (), far, far + kept, _share(far, far + kept), why=why)
 
 
-def error_left(numbers: Numbers) -> float | None:
-    """The mean error with a cause taken off whose gain is certain, m; None where none is.
-
-    Of the points that the gain is of: without those that are far out, where some are.
-
-    Parameters
-    ----------
-    numbers
-        From `numbers_of`.
-
-    Returns
-    -------
-    float or None
-    """
-    left = numbers.get(("horizontal_error_mean", "calibrated-pose"))
-    if left is not None:
-        left = numbers.get(("horizontal_error_mean", "without-far-out"), left)
-    return None if left is None or not _known(left["value"]) else float(left["value"])
+def number_of(numbers: Numbers, name: str, subject: str) -> float:
+    """A number of the other reports; NaN where none has it."""
+    value = numbers.get((name, subject), {}).get("value")
+    return float("nan") if value is None else float(value)
 
 
-def _known(*values: Any) -> bool:
-    return all(value is not None and math.isfinite(value) for value in values)
-
-
-def error_measured(numbers: Numbers) -> float:
-    """How far off a position typically is by the other reports, m; NaN if none measured it."""
-    entry = numbers.get(("horizontal_error_median", "logged-pose"))
-    return float(entry["value"]) if entry is not None and _known(entry["value"]) else float("nan")
+def _share(gain: float, before: float) -> float:
+    return gain / before if before > 0 else 0.0
 
 
 def is_possible(gain_m: float, mean_m: float, *, certain: bool) -> bool:
@@ -363,14 +311,12 @@ def possible_gain(numbers: Numbers) -> Gain | None:
     Gain or None
         Of `WORTH` of the mean error as logged, or more.
     """
-    gain, before = numbers.get(("gain", "winner")), numbers.get(("horizontal_error_mean", "logged-pose"))
-    if gain is None or before is None or not _known(gain["value"], before["value"]):
-        return None
+    gain = number_of(numbers, "gain", "winner")
+    before = number_of(numbers, "horizontal_error_mean", "logged-pose")
     certain = ("horizontal_error_mean", "calibrated-pose") in numbers
-    if not is_possible(gain["value"], before["value"], certain=certain):
+    if not is_possible(gain, before, certain=certain):
         return None
-    value, of = float(gain["value"]), float(before["value"])
-    return Gain("possible", (), value, of, value / of)
+    return Gain("possible", (), gain, before, gain / before)
 
 
 def doubted(numbers: Numbers) -> tuple[str, ...]:

@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from wildlab.analysis.evaluate import errors_of, score_points
-from wildlab.analysis.georeference import covariances_of, observe
+from wildlab.analysis.georeference import covariances_of, errors_of, observe, score_points
 from wildlab.analysis.georeference import georeference as to_ground
 from wildlab.evaluation.errors import ErrorSummary, summarise
 from wildlab.flight.checks.check import Finding, Use, check_flight, usable_for
@@ -182,7 +181,7 @@ class PointErrors(Brief):
     points
         What was scored.
     table
-        Those of them that can be judged: see `wildlab.analysis.evaluate.score_points`.
+        Those of them that can be judged: see `wildlab.analysis.georeference.score_points`.
     summary
         Of the horizontal errors, m.
     inside_90

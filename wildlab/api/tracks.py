@@ -30,9 +30,15 @@ from wildlab.analysis.navigate import (
 )
 from wildlab.analysis.tracks import tracker
 from wildlab.analysis.tracks.pixels import FILTERS, CvTuning, read_pixels, track_schmidt
-from wildlab.analysis.tracks.scores import FEW_INDEPENDENT, seen_of, verdict, worth_of_errors
 from wildlab.analysis.tracks.single_target import SMOOTHED, TOGETHER, SensorTrack
-from wildlab.analysis.tracks.tracker import WHITE, TrackingResult
+from wildlab.analysis.tracks.tracker import (
+    FEW_INDEPENDENT,
+    WHITE,
+    TrackingResult,
+    seen_of,
+    verdict,
+    worth_of_errors,
+)
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import Average, Series, mean_of_runs, nees, position_nees
 from wildlab.evaluation.errors import summarise_track, track_errors

@@ -14,7 +14,7 @@ from wildlab.errors import WildlabError
 from wildlab.terminal import print_json, print_table, shown, stopped
 
 if TYPE_CHECKING:
-    from wildlab.analysis.camera_clock import CameraClock
+    from wildlab.analysis.camera import CameraClock
     from wildlab.flight.store import Flight
 
 LENGTHS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
@@ -218,7 +218,7 @@ def clock(
 
 def _estimate(flight: Flight, images: Path | None, source: str | None) -> CameraClock:
     from wildlab.analysis import fact
-    from wildlab.analysis.camera_clock import clock_from_motion, clock_from_points
+    from wildlab.analysis.camera import clock_from_images, clock_from_points
 
     if images is None:
         return clock_from_points(flight, source)
@@ -227,7 +227,7 @@ def _estimate(flight: Flight, images: Path | None, source: str | None) -> Camera
     ids = [] if flight.frames is None else [str(one) for one in flight.frames["frame_id"]]
     refused: WildlabError | None = None
     try:
-        found = clock_from_motion(flight, open_frames(images, ids=ids), source)
+        found = clock_from_images(flight, open_frames(images, ids=ids), source)
         if found.numbers["certain"]:
             return found
         why = found.facts
@@ -271,7 +271,8 @@ def calibrate(flight: Path, out: Path, overwrite: bool, source: str | None, seed
     from wildlab.flight.calibration_files import write_calibration
     from wildlab.flight.checks.check import sense_sentences
     from wildlab.flight.store import load_flight
-    from wildlab.reporting.georeferencing import simplest_rivals, words_of_causes
+    from wildlab.reporting.georeferencing import words_of_causes
+    from wildlab.reporting.georeferencing_tables import simplest_rivals
 
     refuse_existing(out, overwrite)
     loaded = load_flight(flight)
@@ -306,7 +307,7 @@ def calibrate(flight: Path, out: Path, overwrite: bool, source: str | None, seed
     else:
         click.echo(f"No constant error is certain ({len(diagnosis.models)} models tried).")
     if gain is None and (others := simplest_rivals(diagnosis)):
-        one, other = words_of_causes(winner.causes), words_of_causes(others[0])
+        one, other = words_of_causes(winner.causes), words_of_causes(diagnosis.models[others[0]].causes)
         click.echo(f"These images do not separate {one} from {other}.")
     click.echo("The noise of its poses takes the place of the standard deviations that a flight states.")
     click.echo(shown(out))

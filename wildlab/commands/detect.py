@@ -62,7 +62,7 @@ def detect(as_json: bool, **asked: Any) -> None:
       wildlab detect images --labels coco.json --also megadetector=batch.json --also yolo=labels --out found
       wildlab detect sea --method floating --out found
     """
-    from wildlab.analysis.detecting.command import DetectRequest, detect_images
+    from wildlab.analysis.detection_command import DetectRequest, detect_images
     from wildlab.flight.files import printable
     from wildlab.messages.catalogue import words
 

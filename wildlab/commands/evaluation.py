@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from wildlab.commands import shared
-from wildlab.commands.shared import ANY, FILE, FOLDER, refuse_existing, terminal_console
+from wildlab.commands.shared import ANY, FILE, FOLDER, refuse_existing, tell_contradictions, terminal_console
 from wildlab.errors import WildlabError
 from wildlab.paths import REPORTS
 from wildlab.runner.processes.ending import start_server
@@ -119,6 +119,7 @@ def georeference(flight: Path, out: Path, overwrite: bool, source: str | None, s
     tell_source(data, source, terminal_console())
     points = to_ground(observations, np.random.default_rng(seed))
     write_points(data, points, out, observations.source)
+    tell_contradictions(data)
     for line in words("terminal", ground_facts(observations, points)):
         click.echo(line)
     click.echo(shown(out))

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from wildlab.commands import shared
-from wildlab.commands.shared import ANY, FILE, FOLDER, terrain_of, terrain_options
+from wildlab.commands.shared import ANY, FILE, FOLDER, tell_contradictions, terrain_of, terrain_options
 from wildlab.errors import WildlabError
 from wildlab.terminal import count, print_json, print_table, sentence, shown, stopped
 
@@ -113,11 +113,8 @@ def import_(
 
 
 def _report(flight: Flight, out: Path) -> None:
-    from wildlab.flight.checks.check import sense_sentences
-
     click.echo(shown(out))
-    for line in sense_sentences(flight):
-        click.echo(line, err=True)
+    tell_contradictions(flight)
 
 
 def _card(raw: tuple[Path, ...], out: Path | None, wishes: dict[str, Any]) -> Proposal:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,46 +12,20 @@ import click
 from wildlab.commands import shared
 from wildlab.commands.shared import FILE, FOLDER, Pair, terminal_console, terrain_of, terrain_options
 from wildlab.errors import WildlabError
+from wildlab.paths import DATA
 from wildlab.terminal import print_json, shown
 
 if TYPE_CHECKING:
     from wildlab.geometry.camera import Camera
 
-#: Numbers that may be given: option, field of `PlanRequest`, what it is without, and what it says.
-_NUMBERS: tuple[tuple[str, str, float | None, str], ...] = (
-    ("--trees", "trees_m", 0.0, "Height of the tallest trees, m."),
-    ("--height", "height_m", None, "Above the ground, m.  [default: by --animal and --pixels]"),
-    ("--animal", "animal_m", 1.5, "Length of what is looked for, m."),
-    ("--pixels", "pixels", 10.0, "Across how many it shall be."),
-    ("--speed", "speed_m_s", 10.0, "Over ground, m/s; with --turn-radius through air."),
-    ("--max-airspeed", "max_air_m_s", None, "Of a multicopter, m/s."),
-    ("--overlap", "overlap", 0.2, "Share of neighbouring rows."),
-    ("--tilt", "tilt_deg", 90.0, "Camera below the horizon, deg."),
-    ("--swing", "swing_deg", 0.0, "Of the gimbal to either side, deg."),
-    ("--rate", "rate_deg_s", None, "Of its swing, deg/s.  [default: as slow as may be]"),
-    ("--exposure", "exposure_ms", 10.0, "Of an image, ms."),
-    ("--direction", "direction_deg", None, "Of the rows, deg from north.  [default: the quickest]"),
-    ("--wind", "wind_m_s", 0.0, "Its speed, m/s."),
-    ("--wind-from", "wind_from_deg", None, "Deg from north."),
-    ("--turn-radius", "turn_radius_m", 0.0, "Of an aircraft that cannot stop, m."),
-    ("--turn-time", "turn_s", 3.0, "Of one that can, s."),
-    ("--climb", "climb_m_s", 3.0, "Climbing or sinking, m/s."),
-    ("--battery", "battery_min", None, "Minutes: longer plans become several flights."),
-    ("--reserve", "reserve", 0.2, "Share left at landing."),
-    ("--max-height", "max_height_m", 120.0, "Above the ground by the rules, m."),
-    ("--animals", "animals", None, "In each area that does not say itself."),
-    ("--density", "density_km2", None, "Or so many on a square kilometre."),
-    ("--detection", "detection", 1.0, "Share of animals in view that are found."),
-    ("--photo-every", "photo_m", 0.0, "Trigger the camera each so many metres."),
-)
-
 
 def _numbers(command: Callable[..., Any]) -> Callable[..., Any]:
-    for option, field, value, text in reversed(_NUMBERS):
-        shows = bool(value)
-        command = click.option(option, field, type=float, default=value, show_default=shows, help=text)(
-            command
+    for one in reversed(tomllib.loads((DATA / "plan.toml").read_text("utf-8"))["number"]):
+        value = one.get("default")
+        option = click.option(
+            one["option"], one["field"], type=float, default=value, show_default=bool(value), help=one["help"]
         )
+        command = option(command)
     return command
 
 
@@ -111,15 +86,14 @@ def plan(
       wildlab plan fence.geojson --camera camera.toml --terrain dem.tif --animals 5 --out flight
       wildlab plan fence.kml --camera camera.toml --turn-radius 40 --wind 6 --wind-from 270 --out flight
     """
-    from wildlab.analysis.plans.request import PlanRequest
-    from wildlab.analysis.plans.result import PAGE, RESULT, plan_flight
+    from wildlab.analysis.plan_request import PlanRequest
+    from wildlab.analysis.plan_result import PAGE, RESULT, plan_flight
     from wildlab.files import write_atomic, write_json
 
     stated = {name: asked.pop(name) for name in list(asked) if name.startswith("terrain_")}
-    exposure_s = asked.pop("exposure_ms") / 1000
     says = terrain_of(terrain, stated, "--terrain-")
     of = lens(camera, image, focal, view)
-    request = PlanRequest(area, of, says, exposure_s=exposure_s, names=names or exact, **asked)
+    request = PlanRequest(area, of, says, names=names or exact, **asked)
     made, covered, result = plan_flight(request, out, terminal_console(), overwrite=overwrite)
     # What makes pages takes seconds to be imported: what is wrong has been said by now.
     from wildlab.reporting.plan import plan_page, with_words

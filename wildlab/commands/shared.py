@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from wildlab.flight.manifest import TerrainSays
+    from wildlab.flight.store import Flight
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -92,6 +93,14 @@ def terminal_console() -> Console:
 
     # Progress goes to standard error: standard output is the path of the result.
     return Console(stderr=True)
+
+
+def tell_contradictions(flight: Flight) -> None:
+    """Say in what a flight contradicts itself, beside what is written."""
+    from wildlab.flight.checks.check import sense_sentences
+
+    for line in sense_sentences(flight):
+        click.echo(line, err=True)
 
 
 #: By the keys of `TerrainSays`: kind, and what it says.

@@ -311,7 +311,8 @@ class AlongAxis(NamedTuple):
     ----------
     mean
         Of the component, m, with its interval from the blocks: those of all axes hold at once, where blocks
-        are longer than errors last.
+        are longer than errors last. NaN where it is wider than the errors lie apart: of too few independent
+        blocks it says nothing.
     share
         Of the mean square of the whole error that a constant of that size takes off, 0 to 1.
     n
@@ -368,6 +369,8 @@ def split_along(
         n = int(np.isfinite(component).sum())
         if n:
             mean = block_mean(component, blocks, each)
+            if mean.high - mean.low > np.nanmax(component) - np.nanmin(component):
+                mean = Interval(mean.estimate, np.nan, np.nan)
             share = n * mean.estimate**2 / squares if squares > 0 else 0.0
             found[name] = AlongAxis(mean, float(share), n)
     return found

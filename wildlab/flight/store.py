@@ -53,6 +53,7 @@ from wildlab.flight.manifest import (
     read_manifest,
 )
 from wildlab.flight.schema import NAV, TABLES, Table, conform
+from wildlab.geometry.frames import Indices
 from wildlab.geometry.terrain import Terrain
 from wildlab.summary_table import Brief, Summary
 
@@ -323,6 +324,15 @@ class Flight(Brief):
     @property
     def truth(self) -> pd.DataFrame | None:
         return self.tables.get("truth")
+
+    @property
+    def timed(self) -> bool:
+        """Whether stamps are seconds, and not the numbers of images."""
+        return self.manifest.time.kind == "utc"
+
+    def frame_rows(self, frame_ids: pd.Series) -> Indices:
+        """The row of each among the frames, -1 for none."""
+        return pd.Index(self.table("frames")["frame_id"]).get_indexer(pd.Index(frame_ids))
 
     @property
     def calibration(self) -> Path | None:

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from scipy.special import stdtrit
 
 from wildlab.errors import WildlabError
-from wildlab.geometry.camera import Camera, normalise, project
+from wildlab.geometry.camera import Camera, project
 from wildlab.geometry.frames import Array
 
 #: The pinhole, and lenses that bend more and more.
@@ -44,9 +44,6 @@ _HELD = {
 FEWEST, POINTS = 4, 6
 #: When an estimate stops: steps, and a change of that share of the parameters.
 STOP = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 200, 1e-12)
-#: Smallest singular value of the normalised derivatives of parameters that views tell apart: 0.1 is two
-#: parameters with a correlation of 0.99.
-PARALLEL = 0.1
 
 
 class Views(NamedTuple):
@@ -260,32 +257,6 @@ def view_errors(camera: Camera, board: ArrayLike, uv: ArrayLike) -> Array:
     return np.asarray(np.sqrt(np.nanmean(squared, axis=1)))
 
 
-def confused(found: Intrinsics) -> list[tuple[str, ...]]:
-    """Groups of parameters that the views cannot tell apart: changed together, they do nothing that shows.
-
-    Parameters
-    ----------
-    found
-        From `calibrate_camera`.
-
-    Returns
-    -------
-    list of tuple of str
-        Names with a say in each lost direction, the strongest first; none where all is told apart.
-    """
-    S = found.information.sum(axis=0)
-    size = np.sqrt(np.diag(S))
-    size[size == 0] = 1.0
-    power, directions = np.linalg.eigh(S / np.outer(size, size))
-    groups = []
-    for value, direction in zip(power, directions.T, strict=True):
-        if value > PARALLEL**2:
-            break
-        order = np.argsort(-np.abs(direction))
-        groups.append(tuple(found.names[i] for i in order if abs(direction[i]) > 0.3))
-    return groups
-
-
 def _check(board: Array, uv: Array) -> None:
     if board.ndim != 2 or board.shape[1] != 3 or uv.ndim != 3 or uv.shape[1:] != (len(board), 2):
         raise WildlabError(
@@ -404,55 +375,3 @@ def choose_lens(board: ArrayLike, uv: ArrayLike, width: int, height: int) -> Len
         if means[lens] - means[best] <= apart.std(ddof=1) / np.sqrt(len(uv)):
             break
     return LensChoice(lens, {name: float(np.sqrt(mean)) for name, mean in means.items()})
-
-
-#: Columns and rows of the raster over which the turn is taken off.
-RASTER = (33, 25)
-
-
-def direction_sd(found: Intrinsics, uv: ArrayLike) -> Array:
-    """How far off the estimate puts what is seen in a fixed direction, apart from a turn of the whole camera.
-
-    The turn is the one that takes up most over the image: a calibration of the mount does the same.
-
-    Parameters
-    ----------
-    found
-        From `calibrate_camera`.
-    uv
-        (N, 2) pixels.
-
-    Returns
-    -------
-    (N,) root of the summed variances of both axes, pixels; NaN where the lens sees nothing.
-    """
-    J, K = _by_direction(found, image_raster(found.camera))
-    seen = np.isfinite(J).all(axis=(1, 2))
-    turn = np.linalg.lstsq(K[seen].reshape(-1, 3), J[seen].reshape(-1, J.shape[-1]), rcond=None)[0]
-    J, K = _by_direction(found, np.asarray(uv, float))
-    left = J - K @ turn
-    return np.asarray(np.sqrt(np.einsum("nip,pq,niq->n", left, found.covariance, left)))
-
-
-def _by_direction(found: Intrinsics, uv: Array) -> tuple[Array, Array]:
-    """How pixels (N, 2) of fixed directions move with the estimate, (N, 2, P), and a turn, (N, 2, 3)."""
-    rays = np.column_stack([normalise(found.camera, uv), np.ones(len(uv))])
-    J, K = _derivatives(found.camera, np.eye(3), np.zeros(3), rays, found.names)
-    return J.reshape(len(uv), 2, -1), K[:, :3].reshape(-1, 2, 3)
-
-
-def image_raster(camera: Camera) -> Array:
-    """Pixels in even rows and columns over the image, its borders included.
-
-    Parameters
-    ----------
-    camera
-        Of the image.
-
-    Returns
-    -------
-    (825, 2) pixels.
-    """
-    columns, rows = RASTER
-    u, v = np.meshgrid(np.linspace(0, camera.width, columns), np.linspace(0, camera.height, rows))
-    return np.column_stack([u.ravel(), v.ravel()])

@@ -9,9 +9,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from wildlab.analysis.evaluate import score_points
-from wildlab.analysis.georeference import covariances_of, georeference, observe
-from wildlab.analysis.image_coverage import POSITION, cover_images, ground_height, ordered
+from wildlab.analysis.georeference import covariances_of, georeference, observe, score_points
+from wildlab.analysis.overview import POSITION, cover_images, ground_height, ordered
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import position_nees
 from wildlab.flight.clocks import frame_times
@@ -254,7 +253,7 @@ def scene_of(
     source
         Name of the ``nav`` table; left out, the best known one.
     estimates
-        A table of tracks, as `wildlab.analysis.tracks.scores.estimates_table` makes it.
+        A table of tracks, as `wildlab.analysis.tracks.tracker.estimates_table` makes it.
 
     Returns
     -------

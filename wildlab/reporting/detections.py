@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from wildlab.analysis.detecting.scores import ELLIPSE, rate_words
+from wildlab.analysis.detection_scores import ELLIPSE, rate_words
 from wildlab.messages.catalogue import Message, load_texts, words
 from wildlab.messages.quantities import NOTHING, percent_of
 from wildlab.names import figure_name
@@ -178,7 +178,7 @@ def detections_page(
     name
         What was looked at: the name of a folder, never its path.
     result
-        From `wildlab.analysis.detecting.command.detect_images`.
+        From `wildlab.analysis.detection_command.detect_images`.
     frames
         One row for each, with ``frame_id``, ``detections`` and ``problem``.
     sheets
@@ -188,7 +188,7 @@ def detections_page(
     thresholds
         By name, as plain values.
     curves
-        Of detectors that are compared, as of `wildlab.analysis.detecting.scores.curve_table`; None where
+        Of detectors that are compared, as of `wildlab.analysis.detection_scores.curve_table`; None where
         there is only ours.
 
     Returns

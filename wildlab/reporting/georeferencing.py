@@ -15,9 +15,9 @@ import numpy as np
 import pandas as pd
 
 from wildlab.analysis import Fact
-from wildlab.analysis.accuracy import Accuracy, Repeats
-from wildlab.analysis.diagnose import CAUSES, Diagnosis
-from wildlab.analysis.evaluate import errors_of, on_one_heading
+from wildlab.analysis.accuracy import Accuracy, Repeats, on_one_heading
+from wildlab.analysis.diagnose import CAUSES, Diagnosis, nonzero
+from wildlab.analysis.georeference import errors_of
 from wildlab.analysis.verdict import (
     FEW_POINTS,
     MANY_LOST,
@@ -47,8 +47,7 @@ from wildlab.reporting.georeferencing_tables import (
     outliers_table,
     parameters_table,
     parts_table,
-    significant_parameters,
-    terrain_section,
+    simplest_rivals,
 )
 from wildlab.reporting.layout import ADVICE
 from wildlab.reporting.published import load_published
@@ -171,7 +170,7 @@ def truth_kinds(flight: Flight, scored: pd.DataFrame) -> TruthKinds:
     flight
         With truth.
     scored
-        From `wildlab.analysis.evaluate.score_points`, of it.
+        From `wildlab.analysis.georeference.score_points`, of it.
     """
     if flight.manifest.kind == "twin":
         return EXACT
@@ -200,16 +199,9 @@ def significant_causes(diagnosis: Diagnosis) -> tuple[str, ...]:
 
     Only these are named: what a fit takes along without being able to tell it from zero is not blamed.
     """
-    parameters = set(significant_parameters(diagnosis.calibration))
+    parameters = set(nonzero(diagnosis.calibration))
     causes = diagnosis.winner.causes
     return tuple(cause for cause in causes if parameters & set(CAUSES[cause])) or causes
-
-
-def simplest_rivals(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
-    """Causes of the rivals that hold no other rival, the two of the least held-out error at most."""
-    rivals = [one for one in diagnosis.rivals if one.causes and one.causes != diagnosis.winner.causes]
-    simple = [one for one in rivals if not any(set(other.causes) < set(one.causes) for other in rivals)]
-    return [one.causes for one in sorted(simple, key=lambda one: one.gain.with_)][:2]
 
 
 def words_of_causes(causes: Sequence[str]) -> str:
@@ -237,7 +229,8 @@ def cause_message(diagnosis: Diagnosis | None) -> Message:
         "with": short_length(winner.gain.with_),
     }
     if not diagnosis.counts:
-        others = [one for one in simplest_rivals(diagnosis) if not set(causes) <= set(one)]
+        simplest = [diagnosis.models[m].causes for m in simplest_rivals(diagnosis)]
+        others = [one for one in simplest if not set(causes) <= set(one)]
         if others:
             rivals = listed([words_of_causes(one) for one in others], "or")
             return Message("cause-inseparable", {**values, "others": rivals})
@@ -338,15 +331,16 @@ def advice(found: Accuracy, *, calibrated_elsewhere: bool, problems: int = 0) ->
         said.append(Message("advice-lost"))
     if diagnosis is None:
         return [*said, *([Message("advice-more-points")] if found.summary.n else [])][:MOST_ADVICE]
-    first = next((one for one in diagnosis.outliers if one.kind != "click"), None)
-    if first is not None:
-        name = first.mark if first.kind == "mark" else first.photo
-        values = {"kind": first.kind, "name": str(name), "error": short_length(first.off_m)}
-        said.append(Message("advice-outlier", values))
     if diagnosis.counts and gained_share(diagnosis.winner.gain) >= WORTH:
         said.append(Message("advice-recalibrate" if calibrated_elsewhere else "advice-calibrate"))
     elif diagnosis.rivals and diagnosis.winner.gain.counts and not calibrated_elsewhere:
         said.append(Message("advice-vary"))
+    first = next((one for one in diagnosis.outliers if one.kind != "click"), None)
+    # What is far out may come of what contradicts itself, or of a constant error that is not certain.
+    if first is not None and not problems and not possible_share(found.summary, diagnosis):
+        name = first.mark if first.kind == "mark" else first.photo
+        values = {"kind": first.kind, "name": str(name), "error": short_length(first.off_m)}
+        said.append(Message("advice-outlier", values))
     return said[:MOST_ADVICE]
 
 
@@ -376,20 +370,16 @@ def limits(
         ("limit-clock-fitted", manifest.kind != "twin" and abs(rest) > 1e-6, {"offset": f"{rest:+.2f}"}),
         ("limit-halves", bool(found.halves.disagree), {}),
         ("limit-nearest", found.visible_m == found.visible_m, {"hidden": short_length(found.visible_m)}),
-        ("limit-track", truth.tracked > 0, {"sd": _sd_words(truth.track_sd_m)}),
+        ("limit-track", truth.tracked > 0, {"sd": measure(truth.track_sd_m, "m")}),
         ("limit-wander", diagnosis is not None and diagnosis.counts, {}),
         ("limit-unlabelled", bool(programs), {}),
         ("limit-untimed", not timed, {}),
         ("limit-vertical", bool(manifest.vertical.correction_m), {}),
-        ("limit-mark", truth.marked > 0, {"sd": _sd_words(truth.mark_sd_m)}),
+        ("limit-mark", truth.marked > 0, {"sd": measure(truth.mark_sd_m, "m")}),
         ("limit-marking", True, {}),
         ("limit-ground", True, {}),
     )
     return [Message(key, values) for key, applies, values in conditional if applies][:5]
-
-
-def _sd_words(sd_m: float) -> str:
-    return measure(sd_m, "m") if np.isfinite(sd_m) else "–"
 
 
 # -- the page
@@ -426,11 +416,10 @@ def show_advice(report: Report, said: Sequence[str]) -> None:
         report.points(said, ordered=True)
 
 
-def show_contradictions(report: Report, amiss: Sequence[str], *, shown: bool) -> None:
-    """What does not fit together in the flight; only how much where its locations are not open."""
+def show_contradictions(report: Report, amiss: Sequence[str]) -> None:
+    """What does not fit together in the flight: these sentences name no place."""
     if amiss:
-        hidden = [f"{len(amiss)} found: `wildlab check` says what."]
-        report.alert("What does not fit together", list(amiss) if shown else hidden)
+        report.alert("What does not fit together", amiss)
 
 
 def show_accuracy(
@@ -477,7 +466,7 @@ def show_accuracy(
     show_summary(report, wording, found, problems, calibrated_elsewhere=bool(applied))
     if applied:
         report.text(" ".join(words("georeferencing", applied)))
-    show_contradictions(report, amiss, shown=shown)
+    show_contradictions(report, amiss)
     logged, diagnosis = found.summary, found.diagnosis
     corrections = (
         parameters_table(report, diagnosis.calibration) if diagnosis and diagnosis.winner.causes else None
@@ -510,9 +499,8 @@ def show_accuracy(
     if diagnosis is not None:
         wording.table("axes", axes_table(found.axes))
     wording.table("parts", parts_table(found))
-    if found.noise is not None:
-        wording.table("noise", noise_table(found.noise, found.assumed))
-    terrain_section(report, found.observations, found.points)
+    if diagnosis is not None:
+        wording.table("noise", noise_table(diagnosis.noise, found.assumed))
     report.method(texts.method)
 
 
@@ -641,7 +629,7 @@ def verdict_of_repeats(found: Repeats, problems: int = 0) -> tuple[Verdict, Mess
 
 
 def show_repeats(report: Report, flight: Flight, found: Repeats, amiss: Sequence[str]) -> None:
-    """Write the page, but for its terrain, and record its numbers.
+    """Write the page, and record its numbers.
 
     Parameters
     ----------
@@ -664,7 +652,7 @@ def show_repeats(report: Report, flight: Flight, found: Repeats, amiss: Sequence
         said += cause.messages([cause_message(diagnosis)])
     report.summary(said, level=word.colour, verdict=(word.value, wording.messages([reason])[0]))
     report.metric(VERDICT_LEVEL, "georeferencing", word.level, "1")
-    show_contradictions(report, amiss, shown=flight.manifest.locations.sensitivity == "open")
+    show_contradictions(report, amiss)
     if spread is not None:
         report.metric("sighting_spread", "logged-pose", spread.sd, "m", n=spread.sightings)
         report.metric("sighting_consistency", "logged-pose", spread.consistent, "1", n=spread.sightings)

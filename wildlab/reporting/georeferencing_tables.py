@@ -7,52 +7,18 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pandas as pd
 
-from wildlab.analysis.accuracy import Accuracy
+from wildlab.analysis.accuracy import Accuracy, corrections
 from wildlab.analysis.diagnose import Diagnosis
-from wildlab.analysis.evaluate import errors_of
-from wildlab.analysis.georeference import Observations, shift_from_level
+from wildlab.analysis.georeference import errors_of
 from wildlab.evaluation.correlated_errors import WanderNoise
 from wildlab.evaluation.errors import AlongAxis, ErrorSummary, summarise
 from wildlab.evaluation.outliers import Outlier
 from wildlab.geometry.calibration import BORESIGHT, Calibration
-from wildlab.messages.catalogue import Message, load_texts
-from wildlab.messages.quantities import measure
-from wildlab.reporting.report import Report, Wording
-
-
-def terrain_section(report: Report, observations: Observations, points: pd.DataFrame) -> None:
-    """The section on the terrain, and its metrics; nothing where the flight has none.
-
-    Parameters
-    ----------
-    report
-        Is added to.
-    observations, points
-        What was georeferenced, and where it lies.
-    """
-    if observations.terrain is None:
-        return
-    placed = points["north_m"].notna()
-    report.metric("rays_on_ground", "terrain", float(placed.mean()), "1", n=len(points))
-    shift = shift_from_level(observations, points)
-    if shift.n:
-        report.metric("shift_from_level_ground", "terrain", shift.median, "m", n=shift.n)
-    values = {"shift": measure(shift.median, "m"), "most": measure(shift.largest, "m")}
-    wording = Wording(report, load_texts("georeferencing"))
-    report.section("Terrain", " ".join(wording.messages([Message("terrain-shift", values)])))
-
+from wildlab.messages.catalogue import load_texts
+from wildlab.reporting.report import Report
 
 #: Rows of the table of models.
 SHOWN = 8
-#: Unit of each parameter, and how many of that are one.
-_UNITS = {
-    **dict.fromkeys(("roll", "tilt", "pan", "heading"), ("deg", 180 / np.pi)),
-    **dict.fromkeys(("down", "north", "east"), ("m", 1.0)),
-    **dict.fromkeys(("focal", "aspect"), ("%", 100.0)),
-    **dict.fromkeys(("centre_u", "centre_v"), ("px", 1.0)),
-    "clock": ("s", 1.0),
-    "radial": ("1", 1.0),
-}
 _NOISE = {
     "position_horizontal": ("position_horizontal_m", "m"),
     "position_vertical": ("position_vertical_m", "m"),
@@ -104,12 +70,20 @@ def beside_published(published: pd.DataFrame, theirs: ErrorSummary, ours: ErrorS
     )
 
 
+def simplest_rivals(diagnosis: Diagnosis) -> list[int]:
+    """Numbers of the rivals that hold no other rival, the two of the least held-out error at most."""
+    models, winner = diagnosis.models, diagnosis.winner
+    rivals = [m for m in diagnosis.ranked.rivals if models[m].causes not in ((), winner.causes)]
+    held = [set(models[m].causes) for m in rivals]
+    simple = [m for m in rivals if not any(one < set(models[m].causes) for one in held)]
+    return sorted(simple, key=lambda m: models[m].gain.with_)[:2]
+
+
 def models_table(diagnosis: Diagnosis) -> pd.DataFrame:
-    """The most likely models, the winner bold, and the poses as logged."""
-    shown = list(np.argsort(diagnosis.ranked.scores, kind="stable")[:SHOWN])
-    shown += [m for m in (diagnosis.ranked.winner, 0) if m not in shown]
+    """The most likely models, the winner bold, rivals that the page names, and the poses as logged."""
+    likeliest = np.argsort(diagnosis.ranked.scores, kind="stable")[:SHOWN].tolist()
     rows = []
-    for m in shown:
+    for m in dict.fromkeys([*likeliest, diagnosis.ranked.winner, *simplest_rivals(diagnosis), 0]):
         model = diagnosis.models[m]
         gain = model.gain.gain
         rows.append(
@@ -128,22 +102,12 @@ def models_table(diagnosis: Diagnosis) -> pd.DataFrame:
 def parameters_table(report: Report, calibration: Calibration) -> pd.DataFrame:
     """Estimated corrections with their 95 % intervals, one row each; recorded as metrics too."""
     names, rows = load_texts("georeferencing").quantities, []
-    zero = set(calibration.names) - set(significant_parameters(calibration))
-    for name in calibration.names:
-        unit, scale = _UNITS[name]
-        value, (low, high) = scale * calibration.value(name), (scale * x for x in calibration.interval(name))
+    for one in corrections(calibration):
+        name, value, low, high, unit = one.values()
         metric = f"boresight_{name}" if name in BORESIGHT else f"{name}_offset"
         report.metric(metric, "calibration", value, unit, n=calibration.n_images, low=low, high=high)
-        rows.append(
-            {
-                "what": names[name],
-                "value": value,
-                "low": low,
-                "high": high,
-                "unit": "" if unit == "1" else unit,
-                "zero": name in zero,
-            }
-        )
+        shown = {"what": names[name], "unit": "" if unit == "1" else unit, "zero": low <= 0 <= high}
+        rows.append(one | shown)
     return pd.DataFrame(rows)
 
 
@@ -205,9 +169,3 @@ def noise_table(noise: WanderNoise, assumed: Mapping[str, float]) -> pd.DataFram
             for kind, (key, unit) in _NOISE.items()
         ]
     )
-
-
-def significant_parameters(calibration: Calibration) -> tuple[str, ...]:
-    """Parameters whose interval leaves zero out."""
-    ends = {name: calibration.interval(name) for name in calibration.names}
-    return tuple(name for name, (low, high) in ends.items() if low > 0 or high < 0)

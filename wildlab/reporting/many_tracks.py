@@ -13,7 +13,7 @@ import pandas as pd
 
 from wildlab.analysis.tracks.ground_positions import counts_twice, platform_errors
 from wildlab.analysis.tracks.many import ManyTracks
-from wildlab.analysis.tracks.scores import FEWEST
+from wildlab.analysis.tracks.tracker import FEWEST
 from wildlab.evaluation.identities import Gospa, Identities
 from wildlab.messages.catalogue import Message, load_texts
 from wildlab.messages.quantities import length, percent_of

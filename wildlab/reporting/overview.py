@@ -20,6 +20,7 @@ from wildlab.analysis.overview import (
     JUMP_M,
     LEANT_DEG,
     Alarm,
+    Gain,
     Issue,
     Overview,
     beside_satellites,
@@ -30,12 +31,11 @@ from wildlab.analysis.verdict import (
     LISTED,
     MOST,
     WORTH,
-    Gain,
     Numbers,
     Verdict,
     doubted,
-    error_measured,
     evidence_of,
+    number_of,
     possible_gain,
     verdict_of,
 )
@@ -196,6 +196,17 @@ def reason(found: Judged, counts: Mapping[str, int]) -> Message:
     return Message("reason-sound", {"count": str(found.judged)})
 
 
+def advice(found: Judged) -> list[Message]:
+    """What to do, the most pressing first, `MOST` at most."""
+    said = [Message("problems-remedy")] if found.problems else []
+    # What is far out may come of what contradicts itself, or of a constant error that is not certain.
+    unsure = found.problems > 0 or found.possible is not None
+    gains = sorted(found.gains, key=lambda gain: gain.key == "far_out")
+    told = (gain_message(gain) for gain in gains if not (unsure and gain.key == "far_out"))
+    said += [Message(f"{one.key}-remedy", one.values) for one in told]
+    return said[:MOST]
+
+
 def limits(overview: Overview, lacking: Sequence[str]) -> list[Message]:
     """What the report does not tell; five at most."""
     said = [Message("limit-lacking", {"what": one}) for one in lacking[:2]]
@@ -284,12 +295,12 @@ def record(report: Report, overview: Overview, gains: Sequence[Gain], counts: Ma
     for gain in gains:
         report.metric("gain_share", gain.key, gain.share, "1")
     for lost in overview.lost:
-        report.metric("lost", lost.key, lost.lost, "1", n=lost.of)
+        report.metric("lost", lost.key, lost.value, "1", n=int(lost.of))
 
 
 def _without_pose(overview: Overview) -> int:
     """How many images have no pose."""
-    return next((one.lost for one in overview.lost if one.key == "images_without_pose"), 0)
+    return next((int(one.value) for one in overview.lost if one.key == "images_without_pose"), 0)
 
 
 def things_named(overview: Overview) -> int:
@@ -455,22 +466,18 @@ def show_overview(
         How many of the other reports there are.
     """
     wording = Wording(report, load_texts("overview"))
-    problems = overview.problems + sum(one.startswith("problem") for one in amiss)
+    amiss = [*(f"problem: {one.sentence} {one.fix}" for one in overview.problems), *amiss]
+    problems = sum(one.startswith("problem") for one in amiss)
     possible = possible_gain(numbers)
     counts = counts_of(overview, gains, problems, judged, possible)
     word = verdict_of(evidence_of(counts, numbers))
-    found = Judged(
-        overview, gains, problems, word, possible, doubted(numbers), judged, error_measured(numbers)
-    )
-    shown = overview.flight.manifest.locations.sensitivity == "open"
+    error = number_of(numbers, "horizontal_error_median", "logged-pose")
+    found = Judged(overview, gains, problems, word, possible, doubted(numbers), judged, error)
     report.head(wording.texts.subjects["question"], subtitle(overview))
     wording.summary(answer(found), word, reason(found, counts))
     report.tiles(tiles(overview))
-    show_advice(report, wording.messages(_with_remedies(gains[:MOST])))
-    if overview.problems:
-        (title,) = wording.messages([Message("tables", {"problems": str(overview.problems)})])
-        report.alert(title, [])
-    show_contradictions(report, amiss, shown=shown)
+    show_advice(report, wording.messages(advice(found)))
+    show_contradictions(report, amiss)
     _show_figures(wording, overview)
     record(report, overview, gains, counts)
     report.limits(wording.messages(limits(overview, lacking)))
@@ -484,12 +491,6 @@ def show_overview(
     for key, frame in frames.items():
         wording.table(key, frame)
     report.method(wording.say(wording.texts.method, METHOD_VALUES))
-
-
-def _with_remedies(gains: Sequence[Gain]) -> Iterator[Message]:
-    for gain in gains:
-        message = gain_message(gain)
-        yield Message(f"{message.key}-remedy", message.values)
 
 
 def _show_figures(wording: Wording, overview: Overview) -> None:

@@ -44,7 +44,7 @@ class OwnReport(NamedTuple):
 
     def of_leading_filter(self, name: str) -> dict[str, Mapping[str, Any]]:
         """A number of every track of the filter that a report on tracking leads with, by subject."""
-        from wildlab.analysis.tracks.scores import LEADING  # takes a while, and few pages need it
+        from wildlab.analysis.tracks.tracker import LEADING  # takes a while, and few pages need it
 
         best = next((subject for other, subject in self.numbers if other == LEADING), "ekf")
         return {

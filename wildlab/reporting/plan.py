@@ -11,9 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.patches import Patch
 
-from wildlab.analysis.plans.coverage import Covered
-from wildlab.analysis.plans.plan import Plan
-from wildlab.analysis.plans.result import count, head_count, hectares, minutes, origin_text, percent
+from wildlab.analysis.plan import Plan
+from wildlab.analysis.plan_coverage import Covered
+from wildlab.analysis.plan_result import count, head_count, hectares, minutes, origin_text, percent
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
 from wildlab.messages.catalogue import Message, load_texts, words
@@ -40,7 +40,7 @@ def with_words(result: Mapping[str, Any]) -> dict[str, Any]:
     Parameters
     ----------
     result
-        From `wildlab.analysis.plans.result.plan_result`.
+        From `wildlab.analysis.plan_result.plan_result`.
 
     Returns
     -------
@@ -58,9 +58,9 @@ def plan_page(
     Parameters
     ----------
     plan
-        From `wildlab.analysis.plans.plan.make_plan`.
+        From `wildlab.analysis.plan.make_plan`.
     covered
-        Of each area, from `wildlab.analysis.plans.coverage.cover`.
+        Of each area, from `wildlab.analysis.plan_coverage.cover`.
     result
         From `with_words`.
     exact

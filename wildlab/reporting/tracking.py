@@ -1,6 +1,6 @@
 """The page on a flight's tracks: how wrong they are, and whether their filters know.
 
-What the page says follows by rules from `wildlab.analysis.tracks.scores.score_tracks`; the words lie in
+What the page says follows by rules from `wildlab.analysis.tracks.tracker.score_tracks`; the words lie in
 ``data/messages/en/tracking.toml``.
 """
 
@@ -12,7 +12,8 @@ import numpy as np
 import pandas as pd
 
 from wildlab.analysis.tracks.noise_model import HERE, GivenValue, Tuned
-from wildlab.analysis.tracks.scores import (
+from wildlab.analysis.tracks.single_target import TOGETHER
+from wildlab.analysis.tracks.tracker import (
     CAUTIOUS,
     CONSISTENT,
     FEW_INDEPENDENT,
@@ -21,12 +22,11 @@ from wildlab.analysis.tracks.scores import (
     OVERCONFIDENT,
     UNKNOWN,
     SensorPair,
+    TrackingResult,
     is_at_rest,
     leading_filter,
     verdict,
 )
-from wildlab.analysis.tracks.single_target import TOGETHER
-from wildlab.analysis.tracks.tracker import TrackingResult
 from wildlab.analysis.verdict import VERDICT_LEVEL, Evidence, Verdict, verdict_of
 from wildlab.flight.store import Flight
 from wildlab.messages.catalogue import Message, load_texts
@@ -127,13 +127,12 @@ def split_together(known: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
 
 
 def leading_rows(rows: pd.DataFrame) -> pd.DataFrame:
-    """The tracks of the filter that leads, of one sensor each if any; those with truth where any has."""
-    known = rows[rows["compared"] > 0]
-    if len(known):
-        _, alone = split_together(known)
-        return alone[alone["filter"] == leading_filter(alone)]
-    tracked = rows[rows["detections"] > 0]
-    return tracked[tracked["filter"] == leading_filter(tracked)] if len(tracked) else tracked
+    """One track of each target by each sensor, of one sensor each if any: that of the filter that leads,
+    first those that have one; else, where a sensor's detections cannot go through it, the first."""
+    _, alone = split_together(rows[rows["used"] > 0])
+    other = alone["filter"] != leading_filter(alone)
+    ordered = alone.loc[other.sort_values(kind="stable").index]
+    return ordered.drop_duplicates(["sensor", "target"])
 
 
 def worse_together(rows: pd.DataFrame) -> Message | None:
@@ -168,9 +167,9 @@ def judge_tracks(rows: pd.DataFrame, pairs: Sequence[SensorPair]) -> Verdict:
     Parameters
     ----------
     rows
-        From `wildlab.analysis.tracks.scores.score_tracks`.
+        From `wildlab.analysis.tracks.tracker.score_tracks`.
     pairs
-        From `wildlab.analysis.tracks.scores.compare_sensors`.
+        From `wildlab.analysis.tracks.tracker.compare_sensors`.
 
     Returns
     -------
@@ -433,7 +432,7 @@ def show_tracks(
     flight, followed
         The flight, and its tracks.
     rows, pairs
-        From `wildlab.analysis.tracks.scores`: a row a track, and sensors beside each other.
+        From `wildlab.analysis.tracks.tracker`: a row a track, and sensors beside each other.
     tuned
         What another flight taught.
     source
@@ -476,6 +475,8 @@ def _show_figures(
     name = leading_filter(rows)
     name_of_nav, nav = flight.pose_source(source)
     platforms = {name_of_nav: nav[["north_m", "east_m"]].to_numpy(float)}
+    moving = {one.target for one in followed.tracks if not is_at_rest(one)}
+    shown = shown.sort_values("target", key=lambda names: ~names.isin(moving), kind="stable")
     maps = []
     for target in list(dict.fromkeys(shown["target"]))[:MOST_DRAWN]:
         truth = np.empty((0, 2))

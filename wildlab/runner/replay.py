@@ -12,7 +12,7 @@ import pandas as pd
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
-from wildlab.analysis.tracks.scores import read_estimates
+from wildlab.analysis.tracks.tracker import read_estimates
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic
 from wildlab.flight.manifest import FILE_NAME

@@ -7,12 +7,11 @@ import statistics
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from wildlab.analysis.overview import ALARMS, TROUBLES, Alarm
+from wildlab.analysis.overview import ALARMS, TROUBLES, Alarm, Gain
 from wildlab.analysis.verdict import (
     MOST,
     PARTS,
     WORTH,
-    Gain,
     Verdict,
     causes_told,
     doubted,

@@ -18,7 +18,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from wildlab.analysis.image_coverage import ground_height
+from wildlab.analysis.overview import ground_height
 from wildlab.errors import WildlabError
 from wildlab.flight.calibration_files import Learnt
 from wildlab.flight.clocks import poses_at

@@ -25,8 +25,8 @@ from wildlab.analysis.tracks.noise_model import (
     noise_of_tuning,
 )
 from wildlab.analysis.tracks.scans import scans_of, sensors_of, truths_at
-from wildlab.analysis.tracks.scores import score_track, seen_of
 from wildlab.analysis.tracks.single_target import SensorTrack, track_target
+from wildlab.analysis.tracks.tracker import score_track, seen_of
 from wildlab.analysis.tracks.tuning import tune
 from wildlab.evaluation.consistency import position_nees
 from wildlab.flight.manifest import read_settings
@@ -90,7 +90,7 @@ def follow_flight(
 
 
 def tracks_table(followed: Sequence[SensorTrack], size_m: float = np.nan) -> pd.DataFrame:
-    """`wildlab.analysis.tracks.scores.score_tracks`, with the names of `COMPARED`.
+    """`wildlab.analysis.tracks.tracker.score_tracks`, with the names of `COMPARED`.
 
     ``anees_alone`` takes the truth for exact; ``share_with_target`` is the share of the scans in which the
     sensor saw something near the boat in which the track is nearer to it than ``size_m``.

@@ -16,8 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
-from wildlab.analysis.evaluate import errors_of, score_points
-from wildlab.analysis.georeference import georeference, observe
+from wildlab.analysis.georeference import errors_of, georeference, observe, score_points
 from wildlab.detection.colour import Colour, coloured, find_coloured
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight

@@ -10,8 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from wildlab.analysis.evaluate import errors_of, score_points
-from wildlab.analysis.georeference import georeference, observe
+from wildlab.analysis.georeference import errors_of, georeference, observe, score_points
 from wildlab.analysis.navigate import navigate_observer
 from wildlab.errors import WildlabError
 from wildlab.evaluation.errors import summarise

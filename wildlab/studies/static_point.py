@@ -7,8 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
-from wildlab.analysis.evaluate import errors_of, score_points
-from wildlab.analysis.georeference import covariances_of, georeference, observe
+from wildlab.analysis.georeference import covariances_of, errors_of, georeference, observe, score_points
 from wildlab.analysis.navigate import navigate_observer
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import autocorrelation

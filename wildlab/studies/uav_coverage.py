@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from numpy.typing import NDArray
 
-from wildlab.analysis.plans.coverage import ExecutionErrors, Looks, as_planned
+from wildlab.analysis.plan_coverage import ExecutionErrors, Looks, as_planned
 from wildlab.errors import WildlabError
 from wildlab.evaluation.intervals import mean_share_interval
 from wildlab.geometry.camera import Camera

@@ -36,7 +36,7 @@ from wildlab.analysis.animal_trackers import (
     track_animals,
     turns,
 )
-from wildlab.analysis.plans.coverage import ExecutionErrors, with_errors
+from wildlab.analysis.plan_coverage import ExecutionErrors, with_errors
 from wildlab.evaluation.intervals import mean_interval, mean_share_interval, share_interval
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array

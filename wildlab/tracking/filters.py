@@ -199,7 +199,8 @@ def run_unscented(
     motion
         From `wildlab.tracking.motion`, of n states.
     start
-        ``x`` (n,) and ``P`` (n, n), which must be positive definite: sigma points need its root.
+        ``x`` (n,) and ``P`` (n, n), positive definite but for states that are known: sigma points need its
+        root.
     output_times
         (M,) s, in order; the measurements' own when not given.
 
@@ -214,7 +215,7 @@ def run_unscented(
         detections in a frame, an ``R`` that is not positive definite, a start that is not finite or whose
         ``P`` is no covariance, poses of another length than the measurements.
     numpy.linalg.LinAlgError
-        For a covariance that is not positive definite: a start without variance in some direction.
+        For a covariance that is not positive definite among the states that have a variance.
     """
     # Imported here, for it brings scipy.stats along, which takes longer than all else that is imported.
     from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
@@ -233,7 +234,7 @@ def run_unscented(
         return difference(a, b, angles)
 
     ukf = UnscentedKalmanFilter(
-        n, m, 1.0, hx=None, fx=None, points=MerweScaledSigmaPoints(n, 1.0, 0.0, 0.0),
+        n, m, 1.0, hx=None, fx=None, points=MerweScaledSigmaPoints(n, 1.0, 0.0, 0.0, sqrt_method=_root),
         z_mean_fn=mean if wrapped else None, residual_z=residual,
     )  # fmt: skip
 
@@ -256,6 +257,13 @@ def run_unscented(
         return given.times[row], ukf.x, (ukf.P + ukf.P.T) / 2
 
     return step_through(given, start, motion, step)
+
+
+def _root(P: Array) -> Array:
+    """Upper root (n, n) of a covariance; zero for states without variance, as speeds of targets at rest."""
+    there, root = np.ix_(*2 * (np.diag(P) > 0,)), np.zeros_like(P)
+    root[there] = np.linalg.cholesky(P[there]).T
+    return root
 
 
 #: A mode that fits this much worse than the best keeps so small a share, and can come back.

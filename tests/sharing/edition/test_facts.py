@@ -8,8 +8,7 @@ import pytest
 
 from tests.analysis.robots import KNOWN, robot_flight
 from tests.sharing.edition.flights import flight, overview, report
-from wildlab.analysis.tracks.scores import score_tracks
-from wildlab.analysis.tracks.tracker import track
+from wildlab.analysis.tracks.tracker import score_tracks, track
 from wildlab.analysis.verdict import Gain, numbers_of
 from wildlab.flight.manifest import parse_settings
 from wildlab.reporting import tracking

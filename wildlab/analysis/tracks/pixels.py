@@ -12,7 +12,6 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.analysis.georeference import observe
@@ -146,7 +145,7 @@ def read_pixels(flight: Flight, source: str, target: str | None = None) -> Pixel
     order = np.argsort(stamps, kind="stable")
     place = np.empty(len(order), int)
     place[order] = np.arange(len(order))
-    row = place[pd.Index(frames["frame_id"]).get_indexer(pd.Index(seen.table["frame_id"]))]
+    row = place[flight.frame_rows(seen.table["frame_id"])]
     first, last = int(row.min()), int(row.max()) + 1
     times, ids = stamps[order][first:last], frames["frame_id"].iloc[order[first:last]]
     poses_name, nav = flight.pose_source(source)
@@ -220,7 +219,7 @@ def track_positions(seen: PixelMeasurements, tuning: CvTuning) -> Track:
     >>> track.x.shape == (len(seen.times), 4)
     True
     """
-    return _compiled(seen, seen.positions, np.eye(2) * tuning.measurement**2, tuning, None, None)
+    return _compiled(seen, tuning, seen.positions, tuning.measurement)
 
 
 def track_pixels(seen: PixelMeasurements, tuning: CvTuning) -> Track:
@@ -238,8 +237,7 @@ def track_pixels(seen: PixelMeasurements, tuning: CvTuning) -> Track:
     Track
         (N, 4) states as from `track_positions`; innovations in pixels.
     """
-    view = BatchCamera(seen.poses, seen.plane_down)
-    return _compiled(seen, seen.uv, np.eye(2) * tuning.pixel**2, tuning, view, None)
+    return _compiled(seen, tuning, seen.uv, tuning.pixel, BatchCamera(seen.poses, seen.plane_down))
 
 
 def track_schmidt(
@@ -274,8 +272,7 @@ def track_schmidt(
             "the poses have no covariance", "use those of the MEKF: navigate_mekf(flight)", field="nav"
         )
     view = BatchCamera(seen.poses, seen.plane_down)
-    pose = Considered(POSE, own)
-    return _compiled(seen, seen.uv, np.eye(2) * tuning.pixel**2, tuning, view, pose)
+    return _compiled(seen, tuning, seen.uv, tuning.pixel, view, Considered(POSE, own))
 
 
 #: The filters of H by name: on pixels with the poses' uncertainty considered, on pixels, on the ground.
@@ -288,14 +285,15 @@ FILTERS: dict[str, Callable[[PixelMeasurements, CvTuning], Track]] = {
 
 def _compiled(
     seen: PixelMeasurements,
-    z: Array,
-    R: Array,
     tuning: CvTuning,
-    view: BatchCamera | None,
-    pose: Considered | None,
+    z: Array,
+    sd: float,
+    view: BatchCamera | None = None,
+    pose: Considered | None = None,
 ) -> Track:
-    """One run of the compiled filters, which a test holds against the readable ones."""
-    return run_batch(seen.times, z[None], R, tuning.motion, start(seen, tuning), view=view, pose=pose)[0]
+    """One run of the compiled filters, which a test holds against the readable ones; ``sd`` is that of z."""
+    R, begin = np.eye(2) * sd**2, start(seen, tuning)
+    return run_batch(seen.times, z[None], R, tuning.motion, begin, view=view, pose=pose)[0]
 
 
 class Scored(NamedTuple):

@@ -54,7 +54,7 @@ from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.tracking.filters import run_coloured, run_imm, run_unscented, thin
 from wildlab.tracking.kalman import Considered, consider_all
-from wildlab.tracking.motion import Motion, rest
+from wildlab.tracking.motion import Motion
 from wildlab.tracking.run import Ends, Start, Track, run_filter, start_from_position
 from wildlab.tracking.sensors import (
     Merged,
@@ -353,12 +353,7 @@ def run_named(
         both = [targets.motion(CALM), motion]
         return run_imm(times, own, R, sensor, both, (STAY_S, STAY_S), begin)
     if base in ("ekf", "ukf"):
-        if base == "ekf":
-            track = first
-        elif targets.start_speed_m_s:
-            track = run_unscented(times, own, R, sensor, motion, begin)
-        else:
-            track = _unscented_at_rest(times, own, R, sensor, begin)
+        track = first if base == "ekf" else run_unscented(times, own, R, sensor, motion, begin)
         track = smooth(track, motion) if smoothed else track
     elif base == "thinned" and alone is not None:
         kept = thin(times, alone.noise.thinning_s, first.used)[:, None]
@@ -372,17 +367,6 @@ def run_named(
     # The innovations of a smoothed track are the filter's, and not counted twice.
     innovation, S, nis = (np.full_like(one, np.nan) for one in (track.innovation, track.S, track.nis))
     return track._replace(innovation=innovation, S=S, nis=nis)
-
-
-def _unscented_at_rest(times: Array, own: Array, R: Array, sensor: Sensor, begin: Start) -> Track:
-    """Sigma points of the place alone: a speed that is known to be zero has no spread."""
-    start = begin._replace(x=begin.x[:2], P=begin.P[:2, :2])
-    track = run_unscented(times, own, R, sensor, rest, start)
-    x, P = np.zeros((len(times), 4)), np.zeros((len(times), 4, 4))
-    x[:, :2], P[:, :2, :2] = track.x, track.P
-    gone = np.asarray(~np.isfinite(track.x).all(axis=1))
-    x[gone], P[gone] = np.nan, np.nan
-    return track._replace(x=x, P=P)
 
 
 def _coloured(scans: Scans, beliefs: NoiseModel, own: Array, motion: Motion, begin: Start) -> Track:

@@ -17,6 +17,7 @@ from scipy.optimize import curve_fit, minimize, nnls
 
 from wildlab.analysis.tracks.noise_model import (
     GROUPS,
+    NOISE_OF,
     Against,
     SensorInputs,
     SensorTuning,
@@ -36,9 +37,8 @@ from wildlab.analysis.tracks.scans import (
     truths_at,
 )
 from wildlab.analysis.tracks.single_target import choose
-from wildlab.analysis.tracks.tracker import read_inputs
+from wildlab.analysis.tracks.tracker import read_inputs, worth
 from wildlab.errors import WildlabError
-from wildlab.evaluation.consistency import effective_sample_size
 from wildlab.flight.manifest import Settings
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
@@ -123,13 +123,14 @@ def _tuned(flight: Flight, sensor: str, reach: float, source: str | None, offset
         )
     sized = np.concatenate([one.sized[np.isfinite(one.error[:, 0])] for one in errors])
     sd = float(np.sqrt(np.mean(sized**2)))
-    alike = len(UNITS_OF[scans.kind]) == 1 and "elevation" not in scans.elements
+    alike = len({NOISE_OF[name] for name in scans.elements}) == 1
     own = () if alike else tuple(np.sqrt(np.mean(known**2, axis=0)).tolist())
     sds = np.array(own) if own else np.full(known.shape[1], float(np.sqrt(np.mean(known**2))))
     # Correlated errors are worth fewer: the sum of squares says less than it seems to.
-    worth = sum(_worth(one.error) for one in errors)
+    counted = [one.error for one in errors if np.isfinite(one.error[:, 0]).any()]
+    independent = sum(max([1.0, *map(worth, error.T)]) for error in counted)
     low, high = float("nan"), float("nan")
-    near = offsets[(costs - costs[best]) / (2 * sd**2) * worth / n <= DROP]
+    near = offsets[(costs - costs[best]) / (2 * sd**2) * independent / n <= DROP]
     if len(offsets) > 1:
         low, high = float(near.min()), float(near.max())
     share, correlation_time = _autocorrelation(errors, sds if own else np.ones(1), scans.interval_s)
@@ -160,13 +161,6 @@ def _tuned(flight: Flight, sensor: str, reach: float, source: str | None, offset
     )
 
 
-#: Units of the elements of a measurement, by kind.
-UNITS_OF = {
-    "position": ("m",), "bearing": ("rad",), "range-bearing": ("m", "rad"), "pixel": ("px",),
-    "velocity": ("m/s",),
-}  # fmt: skip
-
-
 def _errors_of(flight: Flight, scans: Scans, reach: float) -> list[_Errors]:
     found = []
     for truth in truths_at(flight, scans.times):
@@ -190,13 +184,6 @@ def _cost(errors: list[_Errors], reach: float) -> float:
         squares.append(size[np.isfinite(one.truth.position[:, 0]) & np.isfinite(size)])
     known = np.concatenate(squares) if squares else np.empty(0)
     return float(known.mean() * sum(len(one.times) for one in errors)) if len(known) else float("inf")
-
-
-def _worth(error: Array) -> float:
-    known = error[np.isfinite(error[:, 0])]
-    if len(known) < 4:
-        return float(len(known))
-    return max([1.0, *(effective_sample_size(column, len(known) - 1) for column in known.T)])
 
 
 def _autocorrelation(errors: list[_Errors], sds: Array, interval: float) -> tuple[float, float]:

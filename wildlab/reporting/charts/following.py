@@ -13,9 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from wildlab.analysis.tracks.many import ManyTracks, known_scans
-from wildlab.analysis.tracks.scores import is_at_rest, whitened
 from wildlab.analysis.tracks.single_target import SMOOTHED, SensorTrack
-from wildlab.analysis.tracks.tracker import TrackingResult
+from wildlab.analysis.tracks.tracker import TrackingResult, is_at_rest, whitened
 from wildlab.evaluation.consistency import autocorrelation, chi_square_interval, white_bound
 from wildlab.evaluation.identities import Identities
 from wildlab.geometry.frames import Array

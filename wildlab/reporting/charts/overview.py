@@ -10,8 +10,7 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from wildlab.analysis.image_coverage import Coverage
-from wildlab.analysis.overview import TROUBLES, Issue, Path
+from wildlab.analysis.overview import TROUBLES, Coverage, Issue, Path
 from wildlab.evaluation.streams import FINE, HARMFUL, Pace
 from wildlab.names import figure_name
 from wildlab.reporting.charts.drawing import (

@@ -151,7 +151,7 @@ def judge_detections(detections: pd.DataFrame, frames: pd.DataFrame, labels: Lab
     Parameters
     ----------
     detections, frames
-        As `wildlab.analysis.detecting.detect.Detected` has them.
+        As `wildlab.analysis.detectors.Detected` has them.
     labels
         Of the same frames.
 
@@ -394,7 +394,7 @@ def compare_detectors(
     name
         What ours are called.
     detections, frames
-        As `wildlab.analysis.detecting.detect.Detected` has them.
+        As `wildlab.analysis.detectors.Detected` has them.
     others
         From `read_others`.
     labels

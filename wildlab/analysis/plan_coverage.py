@@ -15,12 +15,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wildlab.analysis.plans.plan import Plan
-from wildlab.analysis.plans.request import FURTHEST, simplified
-from wildlab.analysis.plans.sorties import Sortie
+from wildlab.analysis.plan import Plan, Sortie
+from wildlab.analysis.plan_request import FURTHEST, simplified
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.frames import Array, Indices, Mask, rotation_vector_to_matrix
+from wildlab.geometry.frames import Array, Indices, Mask, euler_to_matrix, rotation_vector_to_matrix
 from wildlab.geometry.georeference import pixel_rays
 from wildlab.geometry.terrain import Terrain, intersect_terrain
 from wildlab.geometry.viewsheds import lines_clear
@@ -97,7 +96,7 @@ def cover(plan: Plan, tell: Callable[[int, int], None] = lambda done, of: None) 
     Parameters
     ----------
     plan
-        From `wildlab.analysis.plans.plan.make_plan`.
+        From `wildlab.analysis.plan.make_plan`.
     tell
         Called with how many areas are done, of how many.
 
@@ -131,7 +130,7 @@ def images_of(plan: Plan, sortie: Sortie) -> Images:
     Parameters
     ----------
     plan
-        From `wildlab.analysis.plans.plan.make_plan`.
+        From `wildlab.analysis.plan.make_plan`.
     sortie
         One of its flights.
 
@@ -168,7 +167,7 @@ def images_of(plan: Plan, sortie: Sortie) -> Images:
     for run in np.split(rows, np.flatnonzero(np.diff(row_of[rows]) != 0) + 1):
         if len(run) > 1:
             slant = plan.view.slant * plan.height
-            blurred[run] = blur(wanted.camera, poses.take(run), times[run], wanted.exposure_s, slant)
+            blurred[run] = blur(wanted.camera, poses.take(run), times[run], wanted.exposure_ms / 1000, slant)
     most = SHARP * plan.view.pixels(wanted.camera, wanted.animal_m, plan.height)
     return Images(poses.take(rows), (blurred <= most)[rows])
 
@@ -407,11 +406,9 @@ def drawn_errors(
 
 def displaced(poses: CameraPoses, headings: ArrayLike, off: Array, turn: Array) -> CameraPoses:
     """The same poses with errors as `drawn_errors` gives them, for platforms with these headings, rad."""
-    h = np.asarray(headings, float)
     # About the platform's axes, given in n.
-    cos, sin = np.cos(h), np.sin(h)
-    axes = [turn[:, 0] * cos - turn[:, 1] * sin, turn[:, 0] * sin + turn[:, 1] * cos, turn[:, 2]]
-    R = rotation_vector_to_matrix(np.stack(axes, axis=-1)) @ poses.R_nc
+    axes = euler_to_matrix(0.0, 0.0, headings) @ turn[..., None]
+    R = rotation_vector_to_matrix(axes[..., 0]) @ poses.R_nc
     return CameraPoses.at_lens(poses.camera, poses.p_nc + off, R, np.eye(3))
 
 

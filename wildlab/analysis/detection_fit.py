@@ -4,6 +4,7 @@ from.
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -11,8 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.analysis.detecting.detect import METHODS, detect_frame
-from wildlab.analysis.detecting.scores import ELLIPSE, plain_interval
+from wildlab.analysis.detection_scores import ELLIPSE, plain_interval
+from wildlab.analysis.detectors import METHODS, detect_frame
 from wildlab.detection.contrast import PERMISSIVE, Contrast, Proposals, Shape, choose, fit_shape, propose
 from wildlab.detection.detections import Detections
 from wildlab.detection.floating import FloatingThresholds
@@ -22,6 +23,7 @@ from wildlab.evaluation.intervals import Interval, share_interval
 from wildlab.evaluation.matching import Rates, match, rates
 from wildlab.flight.readers.frames import Frame
 from wildlab.geometry.frames import Array, Indices, Mask
+from wildlab.paths import DATA
 
 #: What is tried: where regions come from and end, how far detections are apart, how sure they are at least.
 REGIONS = tuple(
@@ -61,31 +63,40 @@ def fit_shapes(samples: Sequence[Sample], *, tell: Callable[[int, int], None] | 
         Where there are fewer than three groups, or no label at all.
     """
     groups = checked_groups(samples, 3)
-    names = list(dict.fromkeys(groups.tolist()))
     seen: list[list[_Seen]] = []
     for at, sample in enumerate(samples):
         seen.append([_look(sample, number) for number in range(len(REGIONS))])
         if tell:
-            tell(at + 1, len(samples) + len(names) + 1)
-    held_out = np.zeros((len(samples), 3), np.intp)
-    chosen: dict[str, Shape] = {}
-    for at, name in enumerate(names):
-        learnt = _learn(seen, samples, groups, np.flatnonzero(groups != name))
-        chosen[name] = learnt
-        for row in np.flatnonzero(groups == name).tolist():
-            held_out[row] = _count(choose(_of(seen[row], learnt), learnt), samples[row])
-        if tell:
-            tell(len(samples) + at + 1, len(samples) + len(names) + 1)
-    everywhere = range(len(samples))
-    final = _learn(seen, samples, groups, np.arange(len(samples)))
-    inside = [_count(choose(_of(seen[row], final), final), samples[row]) for row in everywhere]
-    raw = [_count(seen[row][-1].proposals.detections, samples[row]) for row in everywhere]
-    if tell:
-        tell(len(samples) + len(names) + 1, len(samples) + len(names) + 1)
-    labels = groups.tolist()
+            tell(at + 1, len(samples))
+
+    def count(learnt: Shape, row: int) -> Indices:
+        proposals = seen[row][REGIONS.index(learnt.regions)].proposals
+        return _count(choose(proposals, learnt), samples[row])
+
+    raw = [_count(own[-1].proposals.detections, sample) for own, sample in zip(seen, samples, strict=True)]
     tried = len(REGIONS) * len(APART) * len(LEAST)
-    out, at_home, plain = (rates(one, labels) for one in (held_out, np.array(inside), np.array(raw)))
-    return Fitted(final, out, at_home, plain, chosen, tried)
+    return _judged(groups, lambda rows: _learn(seen, samples, groups, rows), count, np.array(raw), tried)
+
+
+def _judged(
+    groups: NDArray[np.str_],
+    learn: Callable[[Indices], Any],
+    count: Callable[[Any, int], Indices],
+    plain: Indices,
+    tried: int,
+) -> Fitted:
+    """What is learnt of some frames, each frame judged with what was learnt without its group.
+
+    ``learn`` takes rows of frames to thresholds, ``count`` these and a row to found, invented and missed, and
+    ``plain`` (F, 3) has these of the defaults.
+    """
+    of = groups.tolist()
+    chosen = {name: learn(np.flatnonzero(groups != name)) for name in dict.fromkeys(of)}
+    final = learn(np.arange(len(of)))
+    held_out = np.array([count(chosen[name], row) for row, name in enumerate(of)])
+    inside = np.array([count(final, row) for row in range(len(of))])
+    out, at_home, before = (rates(one, of) for one in (held_out, inside, plain))
+    return Fitted(final, out, at_home, before, chosen, tried)
 
 
 def _look(sample: Sample, number: int) -> _Seen:
@@ -99,11 +110,6 @@ def _look(sample: Sample, number: int) -> _Seen:
     judged = np.ones(len(wanted), bool)
     judged[found.ignored] = False
     return _Seen(proposals, wanted, judged)
-
-
-def _of(seen: Sequence[_Seen], learnt: Shape) -> Proposals:
-    """The regions of a frame that a classifier was learnt for."""
-    return seen[REGIONS.index(learnt.regions)].proposals
 
 
 def _learn(
@@ -296,41 +302,8 @@ def fit_part(
     return PartFit(part_of(every), len(every), share)
 
 
-#: What is tried of each threshold. Lengths in px and levels go up by about a half, as what they gain does.
-GRIDS: dict[str, dict[str, tuple[Any, ...]]] = {
-    "contrast": {
-        "window_px": (31, 61, 101),
-        "smooth_px": (0.7, 1.0, 2.0),
-        "deviation": ("image", "window"),
-        "peak": (4.0, 6.0, 9.0, 13.0, 18.0, 26.0),
-        "edge": (2.5, 4.0),
-        "of_peak": (0.0, 0.3, 0.5, 0.6),
-        "of_image": (0.0, 0.3, 0.6),
-        "smallest_px": (4.0, 10.0, 20.0, 40.0, 80.0),
-        "largest_px": (300.0, 600.0, 1200.0, 4000.0),
-        "longest": (2.5, 4.0, 8.0),
-    },
-    "warm": {
-        "background": ("none", "enhance", "mean", "median"),
-        "threshold": ("constant", "adaptive"),
-        "level": (25.0, 40.0, 65.0, 90.0, 120.0, 160.0, 200.0),
-        "level_is": ("floor", "offset"),
-        "block_px": (51, 101, 251, 451),
-        "smallest_px": (4.0, 10.0, 20.0, 40.0, 80.0),
-        "largest_px": (300.0, 600.0, 1200.0, 4000.0),
-        "apart_px": (0.0, 10.0, 20.0),
-    },
-    "floating": {
-        "gradient": (60.0, 110.0, 160.0, 230.0),
-        "gradient_gain": (0.5, 1.0, 2.0, 4.0),
-        "scaling": ("fixed", "stretched"),
-        "smallest_range_k": (2.0, 4.0, 8.0),
-        "smallest_area": (5.0, 15.0, 50.0, 120.0),
-        "largest_area": (None, 1000.0, 4000.0),
-        "area_of": ("edges", "filled"),
-        "nested": ("boxes", "contours"),
-    },
-}
+#: What is tried of each threshold, by method.
+GRIDS: dict[str, dict[str, list[Any]]] = tomllib.loads((DATA / "thresholds.toml").read_text("utf-8"))
 #: Sets of thresholds that are tried, the defaults among them; and most labelled frames that are looked at.
 TRIED, MOST_FRAMES = 160, 200
 
@@ -389,7 +362,7 @@ def candidates(method: str, count: int = TRIED, seed: int = 1) -> list[Any]:
     Parameters
     ----------
     method
-        One of `wildlab.analysis.detecting.detect.METHODS`.
+        One of `wildlab.analysis.detectors.METHODS`.
     count
         How many at most.
     seed
@@ -451,31 +424,20 @@ def fit_thresholds(
         Where there are fewer than two groups, or no label at all.
     """
     groups = checked_groups(samples, 2)
-    names = list(dict.fromkeys(groups.tolist()))
     sets = list(tried) if tried is not None else candidates(method)
     counts = np.zeros((len(sets), len(samples), 3), np.intp)
     for at, sample in enumerate(samples):
         for row, thresholds in enumerate(sets):
-            found = detect_frame(sample.frame, method, thresholds)
-            counts[row, at] = _count(found, sample)
+            counts[row, at] = _count(detect_frame(sample.frame, method, thresholds), sample)
         if tell:
             tell(at + 1, len(samples))
-    held_out = np.zeros((len(samples), 3), np.intp)
-    chosen = {}
-    for name in names:
-        best = _best(counts[:, groups != name])
-        chosen[name] = sets[best]
-        held_out[groups == name] = counts[best][groups == name]
-    best = _best(counts)
-    labels = groups.tolist()
-    return Fitted(
-        sets[best],
-        rates(held_out, labels),
-        rates(counts[best], labels),
-        rates(counts[0], labels),
-        chosen,
-        len(sets),
-    )
+
+    def best(rows: Indices) -> Any:
+        """That of the largest F1 over some frames; of equal ones the first."""
+        found, invented, missed = counts[:, rows].sum(axis=1).T.astype(float)
+        return sets[int(np.argmax(2 * found / np.maximum(2 * found + invented + missed, 1)))]
+
+    return _judged(groups, best, lambda one, row: counts[sets.index(one), row], counts[0], len(sets))
 
 
 def checked_groups(samples: Sequence[Sample], fewest: int) -> NDArray[np.str_]:
@@ -507,9 +469,3 @@ def checked_groups(samples: Sequence[Sample], fewest: int) -> NDArray[np.str_]:
     if not sum(len(one.boxes) for one in samples):
         raise WildlabError("the labels mark nothing", "give frames with boxes in them")
     return groups
-
-
-def _best(counts: Indices) -> int:
-    """Which of (C, F, 3) has the largest F1 over its frames; of equal ones the first."""
-    found, invented, missed = counts.sum(axis=1).T.astype(float)
-    return int(np.argmax(2 * found / np.maximum(2 * found + invented + missed, 1)))

@@ -20,15 +20,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from wildlab.analysis import Fact, fact
-from wildlab.analysis.detecting.detect import (
-    METHODS,
-    Detected,
-    for_distance,
-    read_thresholds,
-    run_detection,
-    write_thresholds,
-)
-from wildlab.analysis.detecting.fit import (
+from wildlab.analysis.detection_fit import (
     MOST_FRAMES,
     Fitted,
     PartFit,
@@ -38,7 +30,7 @@ from wildlab.analysis.detecting.fit import (
     fit_thresholds,
     with_part,
 )
-from wildlab.analysis.detecting.scores import (
+from wildlab.analysis.detection_scores import (
     ELLIPSE,
     DetectorScore,
     compare_detectors,
@@ -49,6 +41,14 @@ from wildlab.analysis.detecting.scores import (
     plain_rates,
     rates_fact,
     read_others,
+)
+from wildlab.analysis.detectors import (
+    METHODS,
+    Detected,
+    for_distance,
+    read_thresholds,
+    run_detection,
+    write_thresholds,
 )
 from wildlab.detection.detections import PART
 from wildlab.detection.warm import to_grey
@@ -79,7 +79,7 @@ class DetectRequest:
     images, out
         Where frames are, and where what comes out goes.
     method
-        One of `wildlab.analysis.detecting.detect.METHODS`.
+        One of `wildlab.analysis.detectors.METHODS`.
     labels
         By which the detections are judged.
     fit
@@ -586,7 +586,7 @@ def write_pictures(
         Of all frames, in order.
     things
         ``frame_id``, ``verdict``, the box and ``score``; from
-        `wildlab.analysis.detecting.scores.DetectorScore`, or all ``detected``.
+        `wildlab.analysis.detection_scores.DetectorScore`, or all ``detected``.
     into
         Folder: ``overlays/NAME.jpg``, ``missed.jpg``, ``invented.jpg``, and ``found.jpg``, or
         ``detected.jpg`` where nothing is judged.

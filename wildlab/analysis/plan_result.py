@@ -12,15 +12,15 @@ import numpy as np
 from rich.console import Console
 
 from wildlab.analysis import Fact, fact
-from wildlab.analysis.plans.coverage import EDGE, SHARP, Covered, cover, gimbal_rate
-from wildlab.analysis.plans.plan import Plan, make_plan, on_earth, rings_on_earth
-from wildlab.analysis.plans.request import FURTHEST, PlanRequest
-from wildlab.analysis.plans.sorties import Sortie
+from wildlab.analysis.plan import Plan, Sortie, make_plan
+from wildlab.analysis.plan_coverage import EDGE, SHARP, Covered, cover, gimbal_rate
+from wildlab.analysis.plan_request import FURTHEST, PlanRequest
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic, write_json
 from wildlab.flight.files import printable
-from wildlab.flight.readers.vector import Area
+from wildlab.flight.readers.vector import Area, Areas
 from wildlab.flight.writers import Mission, plan_geojson, plan_kml, qgc_plan, waypoints_text
+from wildlab.geometry.frames import Array, ned_to_geodetic
 
 #: Pixels along an animal below which F 3.2's chain and people alike miss many.
 FEW_PIXELS = 5.0
@@ -36,9 +36,9 @@ def plan_result(plan: Plan, covered: Sequence[Covered]) -> dict[str, Any]:
     Parameters
     ----------
     plan
-        From `wildlab.analysis.plans.plan.make_plan`.
+        From `wildlab.analysis.plan.make_plan`.
     covered
-        Of each area, from `wildlab.analysis.plans.coverage.cover`.
+        Of each area, from `wildlab.analysis.plan_coverage.cover`.
 
     Returns
     -------
@@ -222,7 +222,7 @@ def assumed(plan: Plan) -> list[Fact]:
             "counts",
             edge=f"{100 * EDGE:.0f}",
             furthest=FURTHEST,
-            exposure=1000 * wanted.exposure_s,
+            exposure=wanted.exposure_ms,
             sharp=f"{100 * SHARP:.0f}",
             animal=wanted.animal_m,
         )
@@ -309,6 +309,35 @@ def count(n: int, word: str) -> str:
     return f"{n} {word}{'' if n == 1 else 's'}"
 
 
+def on_earth(points: Array, height: Array, areas: Areas) -> tuple[Array, Array, Array]:
+    """Places of n as latitude and longitude in degrees, and heights above the ellipsoid.
+
+    Parameters
+    ----------
+    points
+        (N, 2) north and east, metres.
+    height
+        (N,) above the plane down = 0 of n, metres.
+    areas
+        With the origin.
+
+    Returns
+    -------
+    Latitude, longitude (degrees), height (metres): (N,) each.
+    """
+    p = np.column_stack([points, -np.asarray(height)])
+    lat, lon, h = np.moveaxis(ned_to_geodetic(p, areas.origin), -1, 0)
+    return np.degrees(lat), np.degrees(lon), h
+
+
+def rings_on_earth(area: Area, areas: Areas) -> list[Array]:
+    """Outline and holes of an area, (K, 2) latitude and longitude in degrees each."""
+    return [
+        np.stack(on_earth(ring, np.zeros(len(ring)), areas)[:2], axis=1)
+        for ring in (area.outline, *area.holes)
+    ]
+
+
 #: Files besides those of each flight. All but the page and its numbers hold positions on the Earth.
 MAPS = ("plan.geojson", "plan.kml")
 RESULT, PAGE = "result.json", "report.html"
@@ -320,7 +349,7 @@ def missions(plan: Plan) -> list[Mission]:
     Parameters
     ----------
     plan
-        From `wildlab.analysis.plans.plan.make_plan`.
+        From `wildlab.analysis.plan.make_plan`.
 
     Returns
     -------
@@ -361,7 +390,7 @@ def plan_texts(plan: Plan) -> dict[str, str]:
     Parameters
     ----------
     plan
-        From `wildlab.analysis.plans.plan.make_plan`.
+        From `wildlab.analysis.plan.make_plan`.
 
     Returns
     -------

@@ -54,7 +54,7 @@ def detect_frame(frame: Frame, method: str, thresholds: Any) -> Detections:
     frame
         One with a problem has none.
     method
-        One of `wildlab.analysis.detecting.detect.METHODS`.
+        One of `wildlab.analysis.detectors.METHODS`.
     thresholds
         Of that method.
 

@@ -5,6 +5,7 @@ thing.
 from __future__ import annotations
 
 import math
+import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +22,7 @@ from wildlab.flight.writers import Heights, Vehicle
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import Array, Mask
 from wildlab.geometry.georeference import intersect_plane, pixel_rays
+from wildlab.paths import DATA
 from wildlab.planning.courses import fly
 from wildlab.planning.gimbal import GimbalAngles, camera_attitudes
 from wildlab.planning.patterns import contains, edge_directions, lawn_mower
@@ -150,7 +152,7 @@ def look(camera: Camera, tilt_deg: float, gimbal: str = "fixed", swing_deg: floa
     tilt_deg
         Below the horizon; 90 is straight down.
     gimbal, swing_deg
-        As for `wildlab.analysis.plans.request.PlanRequest`.
+        As for `wildlab.analysis.plan_request.PlanRequest`.
 
     Returns
     -------
@@ -228,33 +230,8 @@ def _swept(camera: Camera, tilt_deg: float, gimbal: str, swing_deg: float, row: 
 #: The least height that is chosen without being asked for, and above treetops, metres.
 LEAST_HEIGHT, CLEARANCE = 10.0, 10.0
 Gimbal = Literal["fixed", "yaw", "roll", "adaptive"]
-#: By field: the option, least and greatest value, unit. What lies outside is a slip of a unit or a key.
-LIMITS: dict[str, tuple[str, float, float, str]] = {
-    "height_m": ("--height", 2.0, 5000.0, "m"),
-    "trees_m": ("--trees", 0.0, 120.0, "m"),
-    "animal_m": ("--animal", 0.05, 30.0, "m"),
-    "pixels": ("--pixels", 1.0, 500.0, "px"),
-    "speed_m_s": ("--speed", 0.5, 80.0, "m/s"),
-    "max_air_m_s": ("--max-airspeed", 0.5, 80.0, "m/s"),
-    "overlap": ("--overlap", 0.0, 0.9, ""),
-    "tilt_deg": ("--tilt", -30.0, 90.0, "deg"),
-    "swing_deg": ("--swing", 0.0, 80.0, "deg"),
-    "rate_deg_s": ("--rate", 0.1, 720.0, "deg/s"),
-    "exposure_s": ("--exposure", 0.0, 1.0, "s"),
-    "wind_m_s": ("--wind", 0.0, 60.0, "m/s"),
-    "wind_from_deg": ("--wind-from", 0.0, 360.0, "deg"),
-    "turn_radius_m": ("--turn-radius", 0.0, 2000.0, "m"),
-    "turn_s": ("--turn-time", 0.0, 120.0, "s"),
-    "climb_m_s": ("--climb", 0.1, 30.0, "m/s"),
-    "battery_min": ("--battery", 0.5, 6000.0, "min"),
-    "reserve": ("--reserve", 0.0, 0.9, ""),
-    "max_height_m": ("--max-height", 2.0, 20_000.0, "m"),
-    "direction_deg": ("--direction", 0.0, 360.0, "deg"),
-    "animals": ("--animals", 0.0, 1e6, ""),
-    "density_km2": ("--density", 0.0, 1e6, "animals/km2"),
-    "detection": ("--detection", 0.0, 1.0, ""),
-    "photo_m": ("--photo-every", 0.0, 10_000.0, "m"),
-}
+#: Each with its option, and what lies outside of which is a slip of a unit or a key.
+NUMBERS = tomllib.loads((DATA / "plan.toml").read_text("utf-8"))["number"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -286,7 +263,7 @@ class PlanRequest:
     gimbal, swing_deg, rate_deg_s
         ``"fixed"``, or how the camera swings to either side of its tilt (F 5.4), how far, and how fast; no
         rate takes the slowest one that leaves nothing out.
-    exposure_s
+    exposure_ms
         For which an image is exposed; of a microbolometer, its thermal time constant.
     wind_m_s, wind_from_deg
         From where the wind blows, clockwise from north; None where there is no wind.
@@ -328,7 +305,7 @@ class PlanRequest:
     gimbal: Gimbal = "fixed"
     swing_deg: float = 0.0
     rate_deg_s: float | None = None
-    exposure_s: float = 0.010
+    exposure_ms: float = 10.0
     wind_m_s: float = 0.0
     wind_from_deg: float | None = None
     turn_radius_m: float = 0.0
@@ -347,11 +324,11 @@ class PlanRequest:
     names: bool = False
 
     def __post_init__(self) -> None:
-        for field, (option, low, high, unit) in LIMITS.items():
-            value = getattr(self, field)
+        for one in NUMBERS:
+            value, low, high = getattr(self, one["field"]), one["least"], one["most"]
             if value is not None and not low <= value <= high:
-                span = f"from {low:g} to {high:g} {unit}".rstrip()
-                raise WildlabError(f"a value of {value:g}", f"give a number {span}", field=option)
+                span = f"from {low:g} to {high:g} {one['unit']}".rstrip()
+                raise WildlabError(f"a value of {value:g}", f"give a number {span}", field=one["option"])
         if (self.gimbal == "fixed") is not (self.swing_deg == 0):
             raise WildlabError(
                 f"a gimbal that is {self.gimbal} with a swing of {self.swing_deg:g} degrees",
