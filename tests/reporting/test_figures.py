@@ -165,3 +165,17 @@ def test_signs_of_a_legend_keep_their_size_in_fewer_columns():
     figures.fit_text(fig)
     assert fig.legends[0]._ncols < 4
     assert {one.get_markersize() for one in fig.legends[0].legend_handles} == before == {9.0}
+
+
+def test_signs_of_a_legend_that_lie_on_one_another_or_on_words_are_found():
+    def drawn(size: float) -> list[str]:
+        fig, ax = figures.new_figure()
+        for name in "ab":
+            ax.plot([0, 1], [0, 1], "o-", ms=size, label=name)
+        fig.legend(loc="outside lower center")
+        figures.fit_text(fig)
+        return overlapping(fig)
+
+    assert drawn(12.0) == []
+    assert {"the sign of 'a'" in one and "the sign of 'b'" in one for one in drawn(22.0)} == {True}
+    assert any(one.startswith("'a' lies on \"the sign of 'a'") for one in drawn(44.0))
