@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
+import glob
 import io
 import os
 import shutil
@@ -174,8 +176,7 @@ def share(
     )
     files = {name: page.encode("utf-8") for name, page in pages.items()}
     put(zip_bytes(files, password) if zipped else files[target.name], target, overwrite)
-    write_atomic(told, "\n".join(lines) + "\n")
-    told.chmod(0o600)
+    put(("\n".join(lines) + "\n").encode("utf-8"), told, overwrite, mode=0o600)
     return Shared(target, told, tuple(lines))
 
 
@@ -381,6 +382,8 @@ _TIME = (1980, 1, 1, 0, 0, 0)
 SHORTEST = 12
 
 
+#: How the name of a `private_folder` begins.
+_PREFIX = "wildlab-share-"
 #: Waits until the process that started it is gone, however it ended, and removes a folder until it stays
 #: away: what that process had started may still write into it.
 _WATCH = """
@@ -398,9 +401,13 @@ for _ in range(20):
 def private_folder() -> Iterator[Path]:
     """A folder among the system's temporary ones that nobody else may open; gone afterwards, however it ends.
 
-    A process of its own watches over it, so that nothing is left where this one is killed.
+    A process of its own watches over it, so that nothing is left where this one is killed. Those that a
+    machine has left when it stopped go first: nobody holds their lock any more.
     """
-    with tempfile.TemporaryDirectory(prefix="wildlab-share-") as folder:
+    for left in Path(tempfile.gettempdir()).glob(f"{_PREFIX}*"):
+        with contextlib.suppress(OSError), _held(left):
+            shutil.rmtree(left, ignore_errors=True)
+    with tempfile.TemporaryDirectory(prefix=_PREFIX) as folder, _held(Path(folder)):
         command = [sys.executable, "-I", "-S", "-c", _WATCH, folder]
         watch = subprocess.Popen(  # noqa: S603 - our own words
             command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
@@ -411,6 +418,17 @@ def private_folder() -> Iterator[Path]:
         finally:
             shutil.rmtree(folder, ignore_errors=True)
             watch.communicate()
+
+
+@contextlib.contextmanager
+def _held(folder: Path) -> Iterator[None]:
+    """Hold a folder's lock, which ends with this process, however that ends; OSError where another has it."""
+    handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
+    finally:
+        os.close(handle)
 
 
 def refuse_existing(target: Path, overwrite: bool) -> None:
@@ -470,8 +488,8 @@ def zip_bytes(files: Mapping[str, bytes], password: str | None = None) -> bytes:
     return whole.getvalue()
 
 
-def put(content: bytes, target: Path, overwrite: bool) -> None:
-    """Write a finished file, whole or not at all.
+def put(content: bytes, target: Path, overwrite: bool, mode: int = 0o644) -> None:
+    """Write a finished file, whole or not at all; half of one that a machine left when it stopped goes.
 
     Raises
     ------
@@ -480,4 +498,6 @@ def put(content: bytes, target: Path, overwrite: bool) -> None:
     """
     refuse_existing(target, overwrite)
     target.parent.mkdir(parents=True, exist_ok=True)
-    write_atomic(target, content)
+    for part in target.parent.glob(f".{glob.escape(target.name)}.*"):
+        part.unlink(missing_ok=True)
+    write_atomic(target, content, mode)
