@@ -35,7 +35,7 @@ CLAIM_COLUMNS = {
     "claim": "claim",
     "source": "where",
     "verdict": "verdict",
-    "share": "true on",
+    "share": "how often true",
     "difference": "difference, mean",
     "premise": "premise",
     "threshold": "at half and twice the threshold",
