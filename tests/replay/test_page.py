@@ -136,7 +136,9 @@ def test_tracks_are_chosen_and_panels_are_high_enough_to_be_read(browser: Any, t
         opened.goto(file.as_uri())
         assert opened.evaluate("shownTracks().length") == 3
         opened.select_option("#target", "<b>")
-        assert opened.evaluate("shownTracks().map(one => one.target + one.filter)") == ["<b>white noise (EKF)"]
+        assert opened.evaluate("shownTracks().map(one => one.target + one.filter)") == [
+            "<b>white noise (EKF)"
+        ]
         opened.select_option("#filter", "")
         assert opened.evaluate("shownTracks().length") == 3
         assert opened.locator("#strips").bounding_box()["height"] > 3 * 120

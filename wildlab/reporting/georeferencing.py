@@ -34,7 +34,7 @@ from wildlab.flight.store import Flight
 from wildlab.messages.catalogue import Message, PageTexts, load_texts, words
 from wildlab.messages.quantities import measure, percent_of, significant
 from wildlab.names import listed
-from wildlab.reporting.charts.tracks import error_scatter, error_shares, errors_by_image
+from wildlab.reporting.charts.tracks import error_map, error_scatter, error_shares, errors_by_image
 from wildlab.reporting.figures import colour
 from wildlab.reporting.georeferencing_tables import (
     SUMMARY,
@@ -49,6 +49,7 @@ from wildlab.reporting.georeferencing_tables import (
     parts_table,
     significant_parameters,
     terrain_section,
+    worst_images,
 )
 from wildlab.reporting.layout import ADVICE
 from wildlab.reporting.published import load_published
@@ -485,6 +486,10 @@ def show_accuracy(
     if logged.n:
         report.tiles(_tiles(found, texts))
         _figures(report, wording, found, programs)
+        report.section(texts.subjects["where"])
+        worst = worst_images(found.scored)
+        wording.figure("error-map", error_map(found.scored, list(worst["image"])))
+        wording.table("worst", worst)
         rows = {texts.subjects["applied" if applied else "logged"]: logged}
         rows |= _other_summaries(found, texts)
         rows |= {texts.subjects["recorded"].format(program): one for program, one in others.items()}

@@ -330,10 +330,6 @@ def show_many(report: Report, followed: ManyTracks, lives: Identities | None) ->
         wording.table("parts", parts_table(lives.gospa), apart)
     report.limits(wording.messages(limits(followed)))
     report.section("Details")
-    table = tracks_table(followed, lives)
-    if len(table):
-        text = wording.texts.tables["tracks"]
-        columns = {name: heading for name, heading in text.columns.items() if name in table}
-        report.table(table, columns=columns, digits=text.digits, caption=text.caption, fold=text.title)
+    wording.table("tracks", tracks_table(followed, lives))
     wording.table("parameters", parameters_table(followed.given), count_assumed(followed.given))
     report.method(wording.texts.method)

@@ -47,9 +47,8 @@ LEVELS = ("good", "warn", "bad", "neutral")
 NOTHING_KNOWN = "Not known: there are too few observations."
 #: Points of an alert that are shown at once: what comes below must not leave the screen.
 ALERTS_SHOWN = 3
-
-#: Rows of a table that is still kept on one page of paper.
-LONGEST_UNBROKEN = 15
+#: Rows in sight of a table that has more than `LONGEST`; the others are folded.
+ROWS_SHOWN = 9
 _FILE_NAME = re.compile(r"[a-z0-9][a-z0-9-]*")
 
 
@@ -235,7 +234,7 @@ class Report:
         digits: Mapping[str, int] | int | None = None,
         fold: str = "",
     ) -> None:
-        """A table without its index: numbers to the right, text to the left.
+        """A table without its index: numbers to the right, text to the left; the first rows of a long one.
 
         Parameters
         ----------
@@ -255,12 +254,17 @@ class Report:
             frame = frame[list(columns)]
         self._tables += 1
         name, caption = f"Table {self._tables}", known(caption)
-        body = table_html(frame, columns or {}, digits, caption or fold or name)
+        # A table behind a fold is whole.
+        shown = len(frame) if fold or len(frame) <= LONGEST else ROWS_SHOWN
+        about: tuple[Any, ...] = (columns or {}, digits, caption or fold or name)
+        body = str(table_html(frame[:shown], *about))
+        if len(frame) > shown:
+            rest = f"<summary>{len(frame) - shown} more rows</summary>{table_html(frame[shown:], *about)}"
+            body += f'<details class="plain">{rest}</details>'
         label = f"<b>{name}.</b> {inline(caption)}" if caption else ""
         if link := csv_link(frame, f"{self.study}-table-{self._tables}", f"{name} as CSV"):
             label += f' <span class="get">{link}</span>'
-        long = " long" if len(frame) > LONGEST_UNBROKEN else ""
-        html = f'<figure class="table{long}">{body}'
+        html = f'<figure class="table">{body}'
         html += f"<figcaption>{label}</figcaption></figure>" if label else "</figure>"
         self._show(f"<details><summary>{inline(fold)}</summary>{html}</details>" if fold else html)
 
@@ -487,17 +491,18 @@ class Wording:
         self.report.figure(fig, name=name, alt=alt, caption=caption, main=main)
 
     def table(self, key: str, frame: pd.DataFrame, values: Mapping[str, Any] | None = None) -> None:
-        """Show a table that has rows: in sight under its title, or folded away behind it."""
+        """Show a table that has rows, as far as it has the columns: in sight under its title, or folded away
+        behind it."""
         if frame.empty:
             return
         text = self.texts.tables[key]
         title, caption = self.say(text.title, values), self.say(text.caption, values)
-        columns = {name: self.say(heading, values) for name, heading in text.columns.items()} or None
+        columns = {name: self.say(heading, values) for name, heading in text.columns.items() if name in frame}
         if text.open:
             self.report.section(title)
         self.report.table(
             frame,
-            columns=columns,
+            columns=columns or None,
             digits=text.digits or None,
             caption=caption,
             fold="" if text.open else title,

@@ -444,11 +444,9 @@ def show_tracks(
     show_answer(report, followed, rows, pairs)
     if followed.notes:
         report.points(followed.notes)
-    table = tracks_table(rows)
-    text = wording.texts.tables["tracks"]
-    columns = {name: heading for name, heading in text.columns.items() if name in table}
-    report.section(text.title)
-    report.table(table, columns=columns, digits=text.digits, caption=text.caption)
+    # Those that the page speaks of are in sight.
+    leading = rows["filter"] == (leading_filter(rows) if len(rows) else "")
+    wording.table("tracks", tracks_table(pd.concat([rows[leading], rows[~leading]])))
     record_restarts(report, rows)
     _show_figures(report, flight, followed, rows, source)
     limits = ["truth" if followed.truth else "innovations", "same-detections"]

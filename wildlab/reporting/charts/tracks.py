@@ -12,13 +12,16 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.collections import EllipseCollection
+from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogFormatter, MaxNLocator
 from numpy.typing import ArrayLike
 
+from wildlab.analysis.georeference import covariances_of
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.evaluation.errors import SLOWEST_M_S
-from wildlab.geometry.covariances import chi2_quantile
+from wildlab.geometry.covariances import chi2_quantile, ellipse_axes
 from wildlab.names import figure_name
 from wildlab.reporting.charts.drawing import (
     DASHED,
@@ -60,6 +63,8 @@ FEW = 20
 STEADY = 60.0
 #: Later lines are thinner, so that one which lies on another does not hide it.
 _WIDTHS = (2.6, 1.3, 1.3, 1.0)
+#: From a number to what it is of.
+LEADER = {"arrowstyle": "-", "color": INK, "lw": 0.6}
 _SINCE = "time since the first detection (s)"
 
 
@@ -328,6 +333,49 @@ def errors_by_image(scored: pd.DataFrame) -> Figure:
     ax.set_ylim(0, None)
     ax.xaxis.set_major_locator(MaxNLocator(integer=True))
     return finish(fig, "image, in order", "error (m)")
+
+
+def error_map(scored: pd.DataFrame, images: Sequence[object]) -> Figure:
+    """Georeferenced points on a map, coloured by their error, with their 90 % ellipses; some images numbered.
+
+    Parameters
+    ----------
+    scored
+        From `wildlab.analysis.evaluate.score_points`.
+    images
+        Ids of frames, of which the first is number 1.
+    """
+    # The largest errors lie on top.
+    placed = scored[scored["error_m"].notna()].sort_values("error_m", kind="stable")
+    north, east = placed["north_m"].to_numpy(float), placed["east_m"].to_numpy(float)
+    error = placed["error_m"].to_numpy(float)
+    fig, ax = new_figure(5.6, 5.2)
+    truth = east - placed["error_east_m"], north - placed["error_north_m"]
+    draw_dots(ax, *truth, colour("truth"), "truth", marker="+", mec=colour("truth"), size=6, alpha=1.0)
+    cmap = LinearSegmentedColormap.from_list("error", [BLUE, ORANGE, VERMILLION])
+    norm = Normalize(0, float(np.quantile(error, 0.98)))
+    dots = ax.scatter(east, north, s=9, c=error, cmap=cmap, norm=norm, zorder=3)
+    covariance = covariances_of(placed)
+    known = np.isfinite(covariance).all(axis=(1, 2))
+    if known.any():
+        long_axis, short_axis, bearing = ellipse_axes(covariance[known])
+        places = np.column_stack([east, north])[known]
+        ellipses = EllipseCollection(
+            2 * long_axis, 2 * short_axis, 90 - np.degrees(bearing), units="xy", offsets=places,
+            offset_transform=ax.transData, facecolors="none", edgecolors=cmap(norm(error[known])), lw=0.7,
+            alpha=float(np.clip(60 / known.sum(), 0.25, 1.0)),
+        )  # fmt: skip
+        ax.add_collection(ellipses)
+        # The few largest may leave the map.
+        reach = float(np.quantile(long_axis, 0.9))
+        ax.update_datalim([places.min(axis=0) - reach, places.max(axis=0) + reach])
+        ax.autoscale_view()
+    for number, image in enumerate(images, start=1):
+        worst = np.flatnonzero(placed["frame_id"] == image)[-1]
+        end_label(ax, east[worst], north[worst], str(number), INK, arrowprops=LEADER)
+    fig.colorbar(dots, ax=ax, shrink=0.8, extend="max").set_label("error (m)")
+    map_axes(ax)
+    return finish(fig)
 
 
 def aircraft_map(aircraft: ArrayLike, seeing: ArrayLike, target: ArrayLike, name: str = "vessel") -> Figure:
