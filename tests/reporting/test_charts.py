@@ -16,13 +16,13 @@ from wildlab.analysis.overview import Path
 from wildlab.analysis.tracks.single_target import SensorTrack
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.geometry.frames import Array
-from wildlab.reporting.charts.following import map_shown
-from wildlab.reporting.charts.navigation import (
+from wildlab.reporting.charts.flights import (
+    Clock,
     error_bands,
+    lines_chart,
     squares_chart,
 )
-from wildlab.reporting.charts.overview import Clock, lines_chart
-from wildlab.reporting.charts.tracks import error_map, speed_and_course
+from wildlab.reporting.charts.tracks import error_map, map_shown, speed_and_course
 from wildlab.reporting.georeferencing_tables import worst_images
 from wildlab.reporting.overview import way_of
 

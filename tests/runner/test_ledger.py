@@ -17,7 +17,7 @@ from wildlab.reporting.front_page import ledger_page
 from wildlab.reporting.published import load_claims, load_published
 from wildlab.reporting.published_tables import tally
 from wildlab.runner.catalogue import StudyEntry, load_studies
-from wildlab.runner.record.status import as_plain, study_status
+from wildlab.runner.status import as_plain, study_status
 
 PUBLISHED = """
 [[number]]

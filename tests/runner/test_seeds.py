@@ -18,10 +18,9 @@ from wildlab.errors import RunFailed
 from wildlab.paths import NOTEBOOKS
 from wildlab.runner import open_study
 from wildlab.runner import seeds as fingerprint
+from wildlab.runner.job import Job
 from wildlab.runner.open_study import trials_table
-from wildlab.runner.processes.job import Job
-from wildlab.runner.processes.scheduling import _waiting
-from wildlab.runner.processes.worker_pool import answer
+from wildlab.runner.scheduling import _waiting
 from wildlab.runner.seeds import (
     SeedWork,
     make_work,
@@ -33,6 +32,7 @@ from wildlab.runner.seeds import (
     sweep_seeds,
     write_seed,
 )
+from wildlab.runner.worker_pool import answer
 from wildlab.studies import protocol
 
 PARAMETERS = {"twin": "static-antenna", "not its own": 3}

@@ -15,8 +15,8 @@ import papermill
 import pytest
 from IPython.core.getipython import get_ipython
 
-from wildlab.runner.processes.ending import ONE_THREAD, start_process
-from wildlab.runner.processes.shell import CellError, execute_notebook
+from wildlab.runner.processes import ONE_THREAD, start_process
+from wildlab.runner.shell import CellError, execute_notebook
 
 CELLS = [
     "print('one')\nprint('two')",

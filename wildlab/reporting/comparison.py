@@ -16,9 +16,8 @@ from wildlab.names import listed
 from wildlab.paths import DATA
 from wildlab.reporting.charts.drawing import DASHED, Values, rows_chart
 from wildlab.reporting.figures import GREY
-from wildlab.reporting.layout import LIMITS
-from wildlab.reporting.notebook_pages import finished_page
-from wildlab.reporting.own_flights import OwnFlight, pill_of
+from wildlab.reporting.front_page import OwnFlight, pill_of
+from wildlab.reporting.notebook_pages import LIMITS, finished_page
 from wildlab.reporting.report import Wording, open_report
 from wildlab.reporting.text import TAGS, csv_link
 

@@ -17,8 +17,7 @@ from wildlab.messages.catalogue import Message, load_texts, words
 from wildlab.messages.quantities import NOTHING, percent_of
 from wildlab.names import figure_name
 from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, new_figure
-from wildlab.reporting.layout import ADVICE
-from wildlab.reporting.notebook_pages import finished_page
+from wildlab.reporting.notebook_pages import ADVICE, finished_page
 from wildlab.reporting.report import Wording, open_report
 
 #: Bytes of pictures on a page at most: it is sent by mail. What has no room is left out, and that is said.

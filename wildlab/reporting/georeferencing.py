@@ -51,7 +51,7 @@ from wildlab.reporting.georeferencing_tables import (
     terrain_section,
     worst_images,
 )
-from wildlab.reporting.layout import ADVICE
+from wildlab.reporting.notebook_pages import ADVICE
 from wildlab.reporting.published import load_published
 from wildlab.reporting.report import Report, Wording
 

@@ -18,7 +18,7 @@ from wildlab.evaluation.identities import Gospa, Identities
 from wildlab.messages.catalogue import Message, load_texts
 from wildlab.messages.quantities import length, percent_of
 from wildlab.names import listed
-from wildlab.reporting.charts import following as charts
+from wildlab.reporting.charts import tracks as charts
 from wildlab.reporting.report import Report, Wording
 from wildlab.reporting.tracking import count_assumed, parameters_table, plain
 from wildlab.tracking.many.tracks import Count, count_interval, count_probabilities

@@ -45,7 +45,7 @@ from wildlab.messages import quantities
 from wildlab.messages.catalogue import Message, load_texts
 from wildlab.messages.quantities import FORMS, metres, number, percent_of
 from wildlab.names import listed
-from wildlab.reporting.charts import overview as charts
+from wildlab.reporting.charts import flights as charts
 from wildlab.reporting.georeferencing import show_advice, show_contradictions, words_of_causes
 from wildlab.reporting.report import Report, Wording
 

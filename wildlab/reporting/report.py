@@ -36,7 +36,7 @@ from wildlab.messages.catalogue import Message, PageTexts, fill
 from wildlab.messages.quantities import known
 from wildlab.reporting import metrics as schema
 from wildlab.reporting.figures import figure_html, png_bytes, save_figure
-from wildlab.reporting.layout import ALERT, LIMITS, METHOD, VERDICT
+from wildlab.reporting.notebook_pages import ALERT, LIMITS, METHOD, VERDICT
 from wildlab.reporting.published import compared_number, judge, load_claims, published_rows
 from wildlab.reporting.published_tables import LONGEST, caption_of, claims_table, published_table
 from wildlab.reporting.status import Standing, standing
@@ -178,8 +178,8 @@ class Report:
             self._show(f'<ul class="tiles">{"".join(items)}</ul>')
 
     def section(self, title: str, intro: str = "", part: str = "") -> None:
-        """``<h2>`` and, if given, a paragraph. ``part`` is one of `wildlab.reporting.layout`: what to do
-        (`ADVICE`) stands before all other sections, wherever it was shown."""
+        """``<h2>`` and, if given, a paragraph. ``part`` is one of `wildlab.reporting.notebook_pages.ORDER`:
+        what to do (`ADVICE`) stands before all other sections, wherever it was shown."""
         marked = f' data-part="{part}"' if part else ""
         heading = f'<h2 id="{slug(title)}"{marked}>{inline(title)}</h2>'
         intro = known(intro)

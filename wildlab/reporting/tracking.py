@@ -31,7 +31,7 @@ from wildlab.analysis.verdict import VERDICT_LEVEL, Evidence, Verdict, verdict_o
 from wildlab.flight.store import Flight
 from wildlab.messages.catalogue import Message, load_texts
 from wildlab.messages.quantities import NOTHING, length, significant
-from wildlab.reporting.charts import following as charts
+from wildlab.reporting.charts import tracks as charts
 from wildlab.reporting.figures import filter_words
 from wildlab.reporting.report import Report, Wording
 

@@ -13,13 +13,12 @@ from wildlab.flight.files import flight_name
 from wildlab.flight.manifest import FILE_NAME, read_manifest
 from wildlab.paths import NOTEBOOKS, REPORTS
 from wildlab.reporting.comparison import comparison_page, flights_table
-from wildlab.reporting.own_flights import OwnFlight
+from wildlab.reporting.front_page import OwnFlight
 from wildlab.runner.catalogue import load_studies
 from wildlab.runner.evaluate import evaluate_flight
-from wildlab.runner.record.digests import read_status
-from wildlab.runner.record.front_page import COMPARISON, build_ledger
-from wildlab.runner.record.own_flights import finished_metrics, own_flights
-from wildlab.runner.record.provenance import provenance_of_flight, read_provenance
+from wildlab.runner.ledger import COMPARISON, build_ledger, finished_metrics, own_flights
+from wildlab.runner.provenance import provenance_of_flight, read_provenance
+from wildlab.runner.status import read_status
 
 
 def compare_flights(

@@ -28,13 +28,13 @@ from wildlab.reporting.report import Report, open_report
 from wildlab.runner import vary
 from wildlab.runner.catalogue import StudyEntry, find_study, load_studies
 from wildlab.runner.flights import flights_for
-from wildlab.runner.processes.worker_pool import compute_seeds
 from wildlab.runner.seeds import (
     damaged_line,
     make_work,
     read_seed,
     set_aside,
 )
+from wildlab.runner.worker_pool import compute_seeds
 from wildlab.studies.monte_carlo import record_spread
 from wildlab.studies.page import Shown, show_page, show_twins
 from wildlab.studies.protocol import Study, find_case, split_keys

@@ -33,12 +33,12 @@ from wildlab.runner.catalogue import (
     find_studies,
     load_studies,
 )
-from wildlab.runner.processes.job import Job, other_reports, typed_in_report
-from wildlab.runner.processes.progress import outcome_line, pass_line, shown
-from wildlab.runner.processes.scheduling import Listener, Outcome, run_jobs
-from wildlab.runner.record.digests import read_status
-from wildlab.runner.record.front_page import build_ledger
+from wildlab.runner.job import Job, other_reports, typed_in_report
+from wildlab.runner.ledger import build_ledger
+from wildlab.runner.progress import outcome_line, pass_line, shown
+from wildlab.runner.scheduling import Listener, Outcome, run_jobs
 from wildlab.runner.seeds import SeedWork, code_key, make_work, missing_seeds, page_key
+from wildlab.runner.status import read_status
 
 #: Guessed seconds of a study that has not been run here yet. Only their order matters.
 GUESSED_S = {"computed": 5.0, "logged": 30.0, "twin": 60.0}

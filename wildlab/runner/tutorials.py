@@ -23,10 +23,10 @@ from wildlab.files import digest, write_atomic
 from wildlab.paths import DATA, NOTEBOOKS, PACKAGE, REPORTS
 from wildlab.reporting.notebook_pages import read_notebook
 from wildlab.runner.catalogue import load_studies
-from wildlab.runner.processes.job import Job
-from wildlab.runner.processes.progress import shown
-from wildlab.runner.processes.scheduling import Outcome, run_jobs
-from wildlab.runner.record.front_page import build_ledger, title_of, tutorial_links, tutorial_notebooks
+from wildlab.runner.job import Job
+from wildlab.runner.ledger import build_ledger, title_of, tutorial_links, tutorial_notebooks
+from wildlab.runner.progress import shown
+from wildlab.runner.scheduling import Outcome, run_jobs
 from wildlab.runner.seeds import code_key
 
 #: What a tutorial shows comes out of these besides the rooms below them (`wildlab.runner.seeds`).
@@ -35,7 +35,7 @@ _SHOWING = (
     "reporting/**/*.py",
     "summary_table.py",
     "runner/tutorials.py",
-    "runner/processes/notebook_process.py",
+    "runner/notebook_process.py",
 )
 _PACKAGES = ("matplotlib", "nbconvert", "latex2mathml")
 

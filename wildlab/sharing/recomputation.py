@@ -17,14 +17,13 @@ from wildlab.flight.files import dump_toml
 from wildlab.flight.manifest import parse_settings
 from wildlab.flight.store import CALIBRATION, Flight, save_flight
 from wildlab.paths import NOTEBOOKS
+from wildlab.reporting.front_page import OwnFlight
 from wildlab.reporting.metrics import AGAINST
-from wildlab.reporting.own_flights import OwnFlight
 from wildlab.runner.evaluate import evaluate_flight
-from wildlab.runner.processes.scheduling import Outcome
-from wildlab.runner.record.own_flights import ABOUT, finished_metrics, own_flights
+from wildlab.runner.ledger import ABOUT, finished_metrics, own_flights
+from wildlab.runner.scheduling import Outcome
 from wildlab.runner.track import track_many
-from wildlab.sharing.generalisation import Generalised, neutral_learnt
-from wildlab.sharing.names import Names, neutral_settings
+from wildlab.sharing.generalisation import Generalised, Names, neutral_learnt, neutral_settings
 from wildlab.sharing.reports import ENDS, MANY, Source
 from wildlab.sharing.tiers import describe
 

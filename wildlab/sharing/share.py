@@ -26,10 +26,8 @@ from wildlab.flight.store import Flight, confirmed_locations, load_flight
 from wildlab.messages.catalogue import Day, Language, load_language, load_texts
 from wildlab.paths import NOTEBOOKS, REPORTS
 from wildlab.runner.catalogue import load_studies
-from wildlab.sharing.allow_list import first_foreign_word
-from wildlab.sharing.document import Chapter, join_chapters, read_part
-from wildlab.sharing.edition import edition_html, map_of
-from wildlab.sharing.edition_story import facts_of
+from wildlab.sharing.allow_list import Chapter, first_foreign_word, join_chapters, read_part
+from wildlab.sharing.edition import edition_html, facts_of, map_of
 from wildlab.sharing.generalisation import Generalised, generalise
 from wildlab.sharing.recomputation import RecomputedReports, describe_agreement, recompute_reports
 from wildlab.sharing.reports import Source, flight_folder, sources_of

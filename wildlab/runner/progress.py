@@ -19,7 +19,7 @@ from rich.progress import (
 )
 from rich.table import Column
 
-from wildlab.runner.processes.job import Job
+from wildlab.runner.job import Job
 
 _STAGES = {"flight": "preparing the flight", "notebook": "starting", "page": "writing the page"}
 _ENDS = {"done": "[green]done[/]", "failed": "[red]failed[/]", "skipped": "[yellow]skipped[/]"}
@@ -50,7 +50,7 @@ def pass_line(jobs: Sequence[Job]) -> str:
 
 @contextmanager
 def shown(console: Console) -> Iterator[Callable[[str, str, Any], None]]:
-    """Yields the listener for `wildlab.runner.processes.scheduling.run_jobs`."""
+    """Yields the listener for `wildlab.runner.scheduling.run_jobs`."""
     if not console.is_terminal:
         yield _in_lines(console)
         return
@@ -97,7 +97,7 @@ class Tally:
         return sum(self.seeds.values()) + sum(self.cells.values())
 
     def note(self, name: str, event: str, what: Any) -> None:
-        """One event: see `wildlab.runner.processes.scheduling.Listener`."""
+        """One event: see `wildlab.runner.scheduling.Listener`."""
         if event == "plan":
             self.total = what
         elif event == "start":

@@ -16,12 +16,11 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
-from wildlab.runner.processes.cluster import Cluster
-from wildlab.runner.processes.ending import end_tree, start_process
-from wildlab.runner.processes.job import Failure, Job, clear, install, leave_failure, log_of, sweep
-from wildlab.runner.processes.notebook_process import run_notebook
-from wildlab.runner.processes.worker_pool import WorkerPool
+from wildlab.runner.job import Failure, Job, clear, install, leave_failure, log_of, sweep
+from wildlab.runner.notebook_process import run_notebook
+from wildlab.runner.processes import end_tree, start_process
 from wildlab.runner.seeds import damaged_line, failed_seeds, missing_seeds, set_aside, sweep_seeds
+from wildlab.runner.worker_pool import Cluster, WorkerPool
 
 
 @dataclass(frozen=True)
