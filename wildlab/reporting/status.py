@@ -147,8 +147,8 @@ class Number:
     ``compared`` is None where no run has given ours. ``waiting`` is `MISSING` then, `FIRST_LOOK` where ours
     are of a first look, and else "".
 
-    Where it is compared by its size, ``published``, ``here`` and the bounds are sizes. ``difference`` is ours
-    minus theirs, ``ratio`` ours to theirs; None where we have none, or where one is not above zero.
+    Where it is compared by its size, ``published``, ``here`` and the bounds are sizes. ``ratio`` is ours to
+    theirs; None where we have none, or where one is not above zero.
     """
 
     name: str
@@ -166,10 +166,6 @@ class Number:
     #: "calculated", "mean of runs", "one flight" or "share of images".
     kind: str = "one flight"
     ratio: float | None = None
-    #: The share of our flights that are below the published number.
-    below: float | None = None
-    #: The probability of "outside" for a published flight with errors half as large.
-    power: float | None = None
     by_size: bool = False
     #: What of ours was chosen by it; "" where nothing was.
     fitted: str = ""
@@ -177,10 +173,6 @@ class Number:
     again: bool = False
     #: Over how many flights ``low`` and ``high`` are; None where they are of another kind.
     over: int | None = None
-
-    @property
-    def difference(self) -> float | None:
-        return None if self.here is None else self.here - self.published
 
     @property
     def answers(self) -> tuple[str, str]:
@@ -204,7 +196,6 @@ class Claim:
     low: float | None = None
     high: float | None = None
     met: int | None = None
-    premise: str = ""
     #: A sentence of ours, not of a thesis.
     own: bool = False
 

@@ -27,7 +27,7 @@ from wildlab.analysis.tracks.scores import (
 )
 from wildlab.analysis.tracks.single_target import TOGETHER
 from wildlab.analysis.tracks.tracker import TrackingResult
-from wildlab.analysis.verdict import VERDICT_LEVEL, Evidence, Verdict, verdict_of
+from wildlab.analysis.verdict import Evidence, Verdict, verdict_of
 from wildlab.flight.store import Flight
 from wildlab.messages.catalogue import Message, load_texts
 from wildlab.messages.quantities import NOTHING, length, significant
@@ -409,10 +409,7 @@ def show_answer(
     report.head(
         names["question" if truth else "question-innovations"], f"targets: {targets}, sensors: {sensors}"
     )
-    word = judge_tracks(rows, pairs)
-    words = wording.messages(answer(rows, pairs))
-    report.summary(words, level=word.colour, verdict=(word.value, wording.messages([reason(rows)])[0]))
-    report.metric(VERDICT_LEVEL, "tracking", word.level, "1")
+    wording.summary(answer(rows, pairs), judge_tracks(rows, pairs), reason(rows), "tracking")
 
 
 def show_tracks(
@@ -454,11 +451,8 @@ def show_tracks(
         limits.append("at-rest")
     report.limits(wording.messages(Message(f"limit-{one}") for one in limits))
     report.section("Details")
-    restarts = restarts_table(followed, rows)
-    if len(restarts):
-        wording.table("restarts", restarts)
-    if pairs:
-        wording.table("apart", apart_table(pairs))
+    wording.table("restarts", restarts_table(followed, rows))
+    wording.table("apart", apart_table(pairs))
     flights = {"tuned": tuned.flight if tuned is not None else "no other flight"}
     wording.table("parameters", parameters_table(followed.given), count_assumed(followed.given) | flights)
     report.method(wording.texts.method)

@@ -32,11 +32,6 @@ def outcome_line(outcome: Any) -> str:
     return f"{_ENDS[outcome.state]}  [bold]{escape(outcome.name)}[/]{took}{why}"
 
 
-def again_line(name: str, words: str) -> str:
-    """One line about kept numbers that are not used, with rich's markup."""
-    return f"seeds {escape(name)}: {escape(words)}"
-
-
 def pass_line(jobs: Sequence[Job]) -> str:
     """What is said before a pass that takes first looks; nothing before any other."""
     looks = sum(bool(job.first_look) for job in jobs)
@@ -76,8 +71,6 @@ def shown(console: Console) -> Iterator[Callable[[str, str, Any], None]]:
             progress.update(task, completed=tally.completed, total=tally.total, description=tally.now())
             if event == "end":
                 progress.console.print(outcome_line(what), highlight=False, soft_wrap=True)
-            elif event == "again":
-                progress.console.print(again_line(name, what), highlight=False, soft_wrap=True)
 
         yield tell
 
@@ -139,8 +132,6 @@ def _in_lines(console: Console) -> Callable[[str, str, Any], None]:
             done, count = what
             if 4 * done // count > 4 * (done - 1) // count:
                 say(f"seeds {escape(name)}: {done} of {count}")
-        elif event == "again":
-            say(again_line(name, what))
         elif event == "note":
             say(f"note  {escape(name)}: {escape(what)}")
         elif event == "end":

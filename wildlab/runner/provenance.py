@@ -230,11 +230,9 @@ def footer(
     if provenance["seed"] is not None:
         parts.append(f"seed {escape(provenance['seed'])}")
     if seeds := provenance.get("seeds"):
-        damaged = seeds["damaged"]["count"]
         parts.append(
             f"numbers of {len(seeds['digests'])} kept seed{'s' * (len(seeds['digests']) != 1)} "
             f"<code>{seeds['digest'][:8]}</code>"
-            + (f", of which {damaged} had been damaged and computed again" if damaged else "")
         )
     parts.append(f"made {escape(provenance['made'].replace('T', ' ').replace('+00:00', ' UTC'))}")
     line = f"<p>{' · '.join(parts)}.</p>"

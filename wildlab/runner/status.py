@@ -166,7 +166,7 @@ def _plain(number: Number) -> dict[str, Any]:
     closeness, compatibility = number.answers
     told = {"closeness": closeness, "compatibility": compatibility}
     plain = {key: value for key, value in asdict(number).items() if key not in ("compared", "waiting")}
-    return plain | told | {"difference": number.difference}
+    return plain | told
 
 
 def _status(folder: Path) -> dict[str, Any]:
@@ -208,12 +208,7 @@ def _claims(study: StudyEntry, metrics: dict[str, Any] | None, state: str, publi
                 text=theirs.get("text") or ours["text"],
                 source=theirs.get("source", ""),
                 verdict=FIRST_LOOK if ours and state == FIRST_LOOK else ours.get("verdict", "not tested yet"),
-                fraction=ours.get("fraction"),
-                seeds=ours.get("seeds"),
-                low=ours.get("low"),
-                high=ours.get("high"),
-                met=ours.get("met"),
-                premise=theirs.get("premise", ""),
+                **{name: ours.get(name) for name in ("fraction", "seeds", "low", "high", "met")},
                 own=bool(theirs.get("own", not theirs)),
             )
         )
