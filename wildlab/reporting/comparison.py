@@ -256,8 +256,8 @@ def _figure(
     title = f"{quantity.label[:1].upper()}{quantity.label[1:]}"
     values = {
         "what": f"{title}{unit}",
-        "n": str(len(found)),
-        "all": str(len(flights)),
+        "n": len(found),
+        "all": len(flights),
         "value": number(value[least]),
         "first": found[least][0],
         "least": number(value[least]),

@@ -225,7 +225,7 @@ def cause_message(diagnosis: Diagnosis | None) -> Message:
         return Message("cause-untried")
     if diagnosis.too_many_out:
         out = int((~diagnosis.inliers).sum())
-        return Message("cause-outliers", {"out": str(out), "points": str(len(diagnosis.inliers))})
+        return Message("cause-outliers", {"out": out, "points": len(diagnosis.inliers)})
     winner = diagnosis.winner
     share = gained_share(winner.gain)
     if not winner.causes or (not diagnosis.counts and share < WORTH):
@@ -252,9 +252,9 @@ def answer(found: Accuracy) -> list[Message]:
     """How far off positions are, and why: the two sentences that answer the page's question."""
     summary, total = found.summary, len(found.scored)
     values = {
-        "points": str(summary.n),
-        "total": str(total),
-        "lost": str(found.lost),
+        "points": summary.n,
+        "total": total,
+        "lost": found.lost,
         "median": short_length(summary.median),
         "p90": short_length(summary.p90),
     }
@@ -316,15 +316,15 @@ def verdict_of_accuracy(
     verdict, total = verdict_of(evidence), logged.n + lost
     gain = gained_share(diagnosis.winner.gain) if diagnosis is not None and diagnosis.counts else 0.0
     times = 1 / ellipses.factor.estimate if ellipses.factor.estimate > 0 else np.nan
-    reasons: tuple[tuple[str, bool, dict[str, str]], ...] = (
-        ("reason-contradictions", problems > 0, {"problems": str(problems)}),
-        ("reason-lost", lost > MANY_LOST * total or not logged.n, {"lost": str(lost), "total": str(total)}),
+    reasons: tuple[tuple[str, bool, dict[str, Any]], ...] = (
+        ("reason-contradictions", problems > 0, {"problems": problems}),
+        ("reason-lost", lost > MANY_LOST * total or not logged.n, {"lost": lost, "total": total}),
         ("reason-gain", gain >= WORTH, {"share": percent_of(gain)}),
-        ("reason-outliers", evidence.troubled > 0, {"outliers": str(evidence.troubled)}),
+        ("reason-outliers", evidence.troubled > 0, {"outliers": evidence.troubled}),
         ("reason-possible", evidence.possible > 0, {"share": percent_of(evidence.possible)}),
         ("reason-ellipses", ellipses.word == "too small", {}),
         ("reason-ellipses-long", is_conservative(ellipses.factor), {"times": significant(times)}),
-        ("reason-few", logged.n < FEW, {"points": str(logged.n)}),
+        ("reason-few", logged.n < FEW, {"points": logged.n}),
         ("reason-untried", diagnosis is None, {}),
         ("reason-sound", True, {}),
     )
@@ -369,11 +369,11 @@ def limits(
     offset = manifest.clocks.camera_offset_s
     rest = offset - ZONE_S * round(offset / ZONE_S)
     timed = manifest.time.kind == "utc" and "frame_id" not in flight.pose_source(source)[1]
-    conditional: tuple[tuple[str, bool, dict[str, str]], ...] = (
+    conditional: tuple[tuple[str, bool, dict[str, Any]], ...] = (
         ("limit-heading", one_heading_hides(found), {}),
         ("limit-misfit", diagnosis is not None and diagnosis.misfit, {}),
         ("limit-extended", diagnosis is not None and diagnosis.extended, {}),
-        ("limit-lost", 0 < found.lost <= MANY_LOST * len(found.scored), {"lost": str(found.lost)}),
+        ("limit-lost", 0 < found.lost <= MANY_LOST * len(found.scored), {"lost": found.lost}),
         ("limit-clock-fitted", manifest.kind != "twin" and abs(rest) > 1e-6, {"offset": f"{rest:+.2f}"}),
         ("limit-halves", bool(found.halves.disagree), {}),
         ("limit-nearest", found.visible_m == found.visible_m, {"hidden": short_length(found.visible_m)}),
@@ -583,7 +583,7 @@ def _ellipse_message(verdict: EllipseVerdict) -> Message:
     factor = verdict.factor
     values = {
         "inside": percent_of(verdict.coverage.estimate),
-        "n": str(verdict.n),
+        "n": verdict.n,
         "factor": significant(factor.estimate),
         "low": significant(factor.low),
         "high": significant(factor.high),
@@ -616,15 +616,15 @@ MOST_THINGS = 20
 def answer_repeats(found: Repeats) -> Message:
     """How far apart sightings lie, and whether the ellipses fit that."""
     spread, total = found.spread, len(found.points)
-    values = {"lost": str(found.lost), "total": str(total)}
+    values: dict[str, Any] = {"lost": found.lost, "total": total}
     if found.lost > MANY_LOST * total:
         return Message("many-lost", values)
     if spread is None:
         return Message("none-twice", values)
     values |= {
         "scatter": short_length(spread.sd),
-        "sightings": str(spread.sightings),
-        "things": str(spread.things),
+        "sightings": spread.sightings,
+        "things": spread.things,
         "ratio": significant(spread.consistent),
     }
     if math.isnan(spread.consistent) or spread.sightings < FEW_POINTS:
@@ -639,9 +639,9 @@ def verdict_of_repeats(found: Repeats, problems: int = 0) -> tuple[Verdict, Mess
     total = len(found.points)
     word = verdict_of(Evidence(problems=problems, lost=found.lost / total if total else math.nan))
     if problems:
-        return word, Message("reason-contradictions", {"problems": str(problems)})
+        return word, Message("reason-contradictions", {"problems": problems})
     if word == Verdict.MEND:
-        return word, Message("reason-lost", {"lost": str(found.lost), "total": str(total)})
+        return word, Message("reason-lost", {"lost": found.lost, "total": total})
     return word, Message("reason-unknown")
 
 

@@ -13,9 +13,10 @@ A value that could not be computed is ``null``. ``low`` and ``high`` bound the s
 highest of fewer, ``null`` for one. Of a calculation they bound what rounded inputs leave open; where there
 are no flights to go over, the middle 90 % of draws with replacement. ``flights`` is how many have a value,
 ``centre_low`` and ``centre_high`` the 90 % confidence interval of their median, and ``power`` the probability
-that a published flight with errors half as large would lie outside (`wildlab.evaluation.replication`). Of a claim, ``fraction`` is the
-share of the ``met`` flights that meet its premise, ``low`` and ``high`` its 95 % interval; ``half`` and
-``twice`` the verdicts at other thresholds; ``difference`` the paired mean difference with its interval.
+that a published flight with errors half as large would lie outside (`wildlab.evaluation.replication`). Of a
+claim, ``fraction`` is the share of the ``met`` flights that meet its premise, ``low`` and ``high`` its 95 %
+interval; ``half`` and ``twice`` the verdicts at other thresholds; ``difference`` the paired mean difference
+with its interval.
 ``seeds`` is how many flights the numbers come from; ``first_look`` in ``status.json`` beside it says where
 those are fewer than the study's own.
 """

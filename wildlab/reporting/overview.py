@@ -139,7 +139,7 @@ def alarm_message(alarm: Alarm, overview: Overview) -> Message:
         "size": size,
         "at": f"{alarm.worst - begin:.0f}",
         "share": percent_of(alarm.share),
-        "times": str(alarm.often),
+        "times": alarm.often,
     }
     once = "-once" if alarm.what == "jumps" and alarm.often == 1 else ""
     return Message(f"alarm-{alarm.what}{once}", values)
@@ -160,7 +160,7 @@ def answer(found: Judged) -> list[Message]:
     if found.verdict in (Verdict.ALARM, Verdict.MEND) and not said and not found.problems:
         said.append(Message("part", {"verdict": found.verdict.value}))
     if found.problems:
-        said.append(Message("problems", {"problems": str(found.problems)}))
+        said.append(Message("problems", {"problems": found.problems}))
     said += [gain_message(gain) for gain in (worth or found.gains)[:1]]
     if lasting:
         said.append(issue_message(max(lasting, key=lambda one: one.seconds), overview))
@@ -182,18 +182,18 @@ def reason(found: Judged, counts: Mapping[str, int]) -> Message:
     """Why the verdict is what it is: the most pressing of what was counted."""
     overview = found.overview
     if overview.alarms:
-        return Message("reason-alarms", {"count": str(len(overview.alarms))})
+        return Message("reason-alarms", {"count": len(overview.alarms)})
     if found.problems:
-        return Message("reason-problems", {"count": str(found.problems)})
+        return Message("reason-problems", {"count": found.problems})
     if counts["worth"]:
-        return Message("reason-worth", {"count": str(counts["worth"]), "share": percent_of(WORTH)})
+        return Message("reason-worth", {"count": counts["worth"], "share": percent_of(WORTH)})
     if found.doubts:
         return Message("reason-doubts", {"reports": listed(list(found.doubts))})
     if counts["troubled"]:
         return Message("reason-troubled", {"what": listed(troubles_of(overview, found.possible))})
     if found.verdict == Verdict.UNJUDGED:
         return Message("reason-unjudged")
-    return Message("reason-sound", {"count": str(found.judged)})
+    return Message("reason-sound", {"count": found.judged})
 
 
 def limits(overview: Overview, lacking: Sequence[str]) -> list[Message]:
@@ -468,7 +468,7 @@ def show_overview(
     report.tiles(tiles(overview))
     show_advice(report, wording.messages(_with_remedies(gains[:MOST])))
     if overview.problems:
-        (title,) = wording.messages([Message("tables", {"problems": str(overview.problems)})])
+        (title,) = wording.messages([Message("tables", {"problems": overview.problems})])
         report.alert(title, [])
     show_contradictions(report, amiss, shown=shown)
     _show_figures(wording, overview)

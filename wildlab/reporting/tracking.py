@@ -211,9 +211,9 @@ def answer(rows: pd.DataFrame, pairs: Sequence[SensorPair]) -> list[Message]:
     known = shown.dropna(subset=[what])
     ratio = np.sqrt(known[what] / (2.0 if with_truth else known["dof"]))
     values = {
-        "n": str(len(mine)),
+        "n": len(mine),
         "filter": load_texts("tracking").subjects[str(mine["filter"].iloc[0])],
-        "judged": str(len(judged)),
+        "judged": len(judged),
         "rmse": length(float(shown["rmse"].median())) if with_truth else "",
         "times": significant(float(np.median(ratio)) if len(ratio) else np.nan),
         **{key: str(int((mine[column] == word).sum())) for key, word in _COUNTED.items()},
@@ -246,15 +246,15 @@ def _beside(
     # Where errors are as predicted, nothing else says so.
     if with_truth and (odd["verdict"] == CONSISTENT).any():
         times = significant(float(np.sqrt((odd["nis"] / odd["dof"]).median())))
-        return Message("surprised", {"tracks": str(len(odd)), "n": str(len(mine)), "times": times})
+        return Message("surprised", {"tracks": len(odd), "n": len(mine), "times": times})
     by_pair = rows.groupby(["sensor", "target"], sort=False)["detections"].max()
     if never := int((~(by_pair > 0)).sum()):
-        return Message("never-tracked", {"never": str(never), "of": str(len(by_pair))})
+        return Message("never-tracked", {"never": never, "of": len(by_pair)})
     if "restarts" in rows:
         each = rows.drop_duplicates(["sensor", "target"])
         if restarts := int(each["restarts"].sum()):
             gone, scans = int(each["untracked"].sum()), int(each["spanned"].sum())
-            return Message("restarted", {"times": str(restarts), "gone": str(gone), "looks": str(scans)})
+            return Message("restarted", {"times": restarts, "gone": gone, "looks": scans})
     if not with_truth:
         used = [one for one in pairs if one.filter == mine["filter"].iloc[0]]
         if not used:

@@ -378,7 +378,7 @@ def _next(facts: Facts, advice: Sequence[Message]) -> Message:
     if facts.verdict == Verdict.FIX and facts.gains:
         # The thing itself: the list stands far below.
         return _do(facts.gains[0])
-    listed: dict[str, Value] = {"list": Message("heading.advice")}
+    listed = {"list": Message("heading.advice")}
     if facts.verdict == Verdict.SOUND:
         return Message("next.sound_more", listed) if advice else Message("next.sound")
     return Message("next.unjudged", listed) if advice else Message("next.nothing")
@@ -402,21 +402,21 @@ def _tiles(facts: Facts) -> list[tuple[Value, Message]]:
 def _measured(facts: Facts) -> list[Message]:
     known, few, others = math.isfinite, facts.compared < FEW, facts.other_sensors
     named, placed = known(facts.things), not others and facts.seen > 0 and known(facts.placed)
-    seen: dict[str, Value] = {"seen": number(facts.seen), "placed": number(facts.placed)}
-    off: dict[str, Value] = {"error": length(facts.track_error), "worst": length(facts.track_worst)}
-    error: dict[str, Value] = {
+    seen = {"seen": number(facts.seen), "placed": number(facts.placed)}
+    off = {"error": length(facts.track_error), "worst": length(facts.track_worst)}
+    error = {
         "median": length(facts.error_median),
         "p90": length(facts.error_p90),
         "compared": number(facts.compared),
         "steps": steps_of(facts.error_median) or number(NAN),
     }
-    scatter: dict[str, Value] = {
+    scatter = {
         "apart": length(MEDIAN_DISTANCE * facts.scatter),
         "sightings": number(facts.sightings),
     }
     # To the metre.
     height = float(f"{facts.height_m:.0f}")
-    area: dict[str, Value] = {"area": Quantity("area", facts.area_m2), "height": length(height)}
+    area = {"area": Quantity("area", facts.area_m2), "height": length(height)}
     tracked, unlike = facts.tracked, _unlike(facts)
     found = _applying(
         (not few, Message("measured.error", error)),
@@ -440,7 +440,7 @@ def _unlike(facts: Facts) -> bool:
 def _alarm(alarm: Alarm) -> Message:
     leans = alarm.what == "leans"
     size = Quantity("angle", math.radians(alarm.size)) if leans else length(alarm.size)
-    values: dict[str, Value] = {"size": size, "times": number(alarm.size / 9.81)}
+    values = {"size": size, "times": number(alarm.size / 9.81)}
     return Message(f"alarm.{alarm.what}", values, alarm.often)
 
 
@@ -495,7 +495,7 @@ def _gained(gain: Gain) -> Message:
     """What it is, in a sentence."""
     of = length if gain.key in ("cause", "far_out") else duration if gain.key.startswith("time") else number
     causes = tuple(Message(f"cause.{_cause_key(cause)}") for cause in gain.causes)
-    values: dict[str, Value] = {
+    values = {
         "share": share(gain.share),
         "of": of(gain.of),
         "gain": length(gain.value),
@@ -650,7 +650,7 @@ def picture_html(picture: MapPicture | None, language: Language) -> str:
     dots = {"seen": (_dots(place(seen)), 4.2), "true": (_dots(place(_known_points(picture.truth))), 3.0)}
     keys = [("way", "path"), ("start", "start")] * bool(len(begin)) + [("seen", "seen")] * bool(len(seen))
     keys += [("true", "truth")] * bool(len(dots["true"][0]))
-    values: dict[str, Value] = {"way": length(float(size[1]))}
+    values = {"way": length(float(size[1]))}
     if len(seen):
         values["seen"] = number(len(seen))
     bar = nice_length(0.42 * WIDTH / scale)
@@ -778,7 +778,7 @@ def edition_html(
 def _place(cell: Cell | None, words: Language) -> Message:
     if cell is None:
         return Message("place.withheld")
-    values: dict[str, Value] = {
+    values = {
         "latitude": _side(cell.latitude_deg, "north", "south", words),
         "longitude": _side(cell.longitude_deg, "east", "west", words),
         "uncertainty": length(cell.uncertainty_m),

@@ -607,7 +607,7 @@ def whiteness_shown(tracks: Sequence[SensorTrack], elements: Sequence[str]) -> S
     return _of_filters(fig, "whiteness", "whiteness", first, far, lags=str(LAGS))
 
 
-def captioned(fig: Figure, page: str, key: str, name: str, **values: str) -> Shown:
+def captioned(fig: Figure, page: str, key: str, name: str, **values: Any) -> Shown:
     """A figure with its name, and its title, alternative text and caption out of a page's catalogue."""
     text = load_texts(page).figures[key]
     title, alt, caption = (fill(one, {}, values) for one in (text.title, text.alt, text.caption))
@@ -702,7 +702,7 @@ def tracks_shown(followed: ManyTracks) -> Shown:
     map_axes(ax)
     finish(fig)
     values = {"tracks": len(ways), "targets": len(followed.truth), "most": MOST_NAMED}
-    return captioned(fig, "tracking-many", "map", "map", **{key: str(n) for key, n in values.items()})
+    return captioned(fig, "tracking-many", "map", "map", **values)
 
 
 def identities_shown(followed: ManyTracks, lives: Identities) -> Shown:
@@ -718,8 +718,7 @@ def identities_shown(followed: ManyTracks, lives: Identities) -> Shown:
     name_rows(ax, [short_name(name) for name in names])
     finish(fig, "time since the first look (s)")
     values = {"changes": lives.swaps + lives.breaks, "targets": len(names), "most": MOST_NAMED}
-    given = {key: str(n) for key, n in values.items()}
-    return captioned(fig, "tracking-many", "identities", "identities", **given)
+    return captioned(fig, "tracking-many", "identities", "identities", **values)
 
 
 def wrong_shown(followed: ManyTracks, lives: Identities) -> Shown:
@@ -745,9 +744,9 @@ def wrong_shown(followed: ManyTracks, lives: Identities) -> Shown:
     values = {
         "mean": f"{distance.mean():.1f}",
         "cutoff": f"{followed.cutoff_m:g}",
-        "looks": str(len(times)),
-        "missed": str(int((missed > 0).sum())),
-        "false": str(int((false > 0).sum())),
+        "looks": len(times),
+        "missed": int((missed > 0).sum()),
+        "false": int((false > 0).sum()),
     }
     return captioned(fig, "tracking-many", "gospa", "gospa", **values)
 
