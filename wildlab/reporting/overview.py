@@ -46,7 +46,7 @@ from wildlab.messages.catalogue import Message, load_texts
 from wildlab.messages.quantities import FORMS, metres, number, percent_of
 from wildlab.names import listed
 from wildlab.reporting.charts import flights as charts
-from wildlab.reporting.georeferencing import show_advice, show_contradictions, words_of_causes
+from wildlab.reporting.georeferencing import show_advice, show_contradictions, span, words_of_causes
 from wildlab.reporting.report import Report, Wording
 
 #: Subject of what is recorded of the whole flight.
@@ -396,16 +396,10 @@ def subtitle(overview: Overview) -> str:
         parts.append(quantities.way_length(way))
     if overview.above is not None and np.isfinite(overview.above[0]).any():
         low, high = np.nanquantile(overview.above[0], [0.05, 0.95])
-        if height := height_words(low, high):
-            parts.append(f"mostly {height} above {overview.above[1]}")
+        if high > 0.5:
+            parts.append(f"mostly {span([low, high])} m above {overview.above[1]}")
     parts.append(f"poses: {overview.source}" if overview.source else "no poses")
     return ", ".join(parts)
-
-
-def height_words(low: float, high: float) -> str:
-    """Between which heights (m): ``"59 to 61 m"``, ``"60 m"``; nothing where it never left the ground."""
-    below, above = round(low), round(high)
-    return f"{below} to {above} m" if below != above else f"{above} m" if above else ""
 
 
 def tiles(overview: Overview) -> list[tuple[str, str]]:

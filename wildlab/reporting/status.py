@@ -6,7 +6,7 @@ import tomllib
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 from wildlab.evaluation.replication import Comparison, Reproduction
 from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY, MOSTLY_NOT, UNDECIDED
@@ -119,27 +119,6 @@ MISSING = "not reproduced yet"
 FIRST_LOOK = "first look"
 
 
-class ListedStudy(Protocol):
-    """What a page says of a study besides its numbers: an entry of ``studies.toml``."""
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def title(self) -> str: ...
-    @property
-    def case(self) -> str | None: ...
-    @property
-    def section(self) -> str: ...
-    @property
-    def kind(self) -> str: ...
-    @property
-    def twin(self) -> str | None: ...
-    @property
-    def dataset(self) -> str | None: ...
-    @property
-    def recipe(self) -> str | None: ...
-
-
 @dataclass(frozen=True)
 class Number:
     """A published number and ours.
@@ -206,7 +185,8 @@ class StudyStatus:
     ``reason`` says why it failed, what does not fit, or that the report has no digests; ``first_look`` what a
     first look shows of what ("5 of 200 flights")."""
 
-    study: ListedStudy
+    #: Its entry in ``studies.toml``.
+    study: Any
     state: str
     reason: str = ""
     seconds: float | None = None

@@ -18,7 +18,7 @@ import pandas as pd
 
 from wildlab.errors import RunFailed, WildlabError
 from wildlab.files import write_json
-from wildlab.paths import NOTEBOOKS, REPORTS
+from wildlab.paths import REPORTS
 from wildlab.reporting.published import judge, load_claims, published_rows
 from wildlab.reporting.report import open_report
 from wildlab.reporting.text import slug
@@ -60,7 +60,6 @@ def vary_study(
     factors: Sequence[float] = FACTORS,
     seeds: int = SEEDS,
     reports: Path = REPORTS,
-    notebooks: Path = NOTEBOOKS,
     parallel: int = 1,
     tell: Callable[[str], None] = lambda line: None,
 ) -> pd.DataFrame:
@@ -92,7 +91,7 @@ def vary_study(
         If the study is unknown or has no trial on simulated flights, a factor is not above zero, or its twin
         cannot be computed as it is.
     """
-    study = find_study(name, load_studies(notebooks / "studies.toml"))
+    study = find_study(name, load_studies())
     case = study.shown_case()
     if case is None or study.twin is None:
         raise WildlabError(

@@ -24,7 +24,7 @@ from wildlab.files import write_atomic
 from wildlab.flight.manifest import FILE_NAME
 from wildlab.flight.store import Flight, confirmed_locations, load_flight
 from wildlab.messages.catalogue import Day, Language, load_language, load_texts
-from wildlab.paths import NOTEBOOKS, REPORTS
+from wildlab.paths import REPORTS
 from wildlab.runner.catalogue import load_studies
 from wildlab.sharing.allow_list import Chapter, first_foreign_word, join_chapters, read_part
 from wildlab.sharing.edition import edition_html, facts_of, map_of
@@ -95,7 +95,6 @@ def share(
     edition: str | Path | None = None,
     overwrite: bool = False,
     reports: Path = REPORTS,
-    notebooks: Path = NOTEBOOKS,
     console: Console | None = None,
 ) -> Shared:
     """Make a copy of a flight's reports, of a study's, or of all in a folder, that is safe to send.
@@ -119,8 +118,8 @@ def share(
         reports, otherwise it is the copy.
     overwrite
         Whether a file that is there may be replaced.
-    reports, notebooks, console
-        Where reports on a flight's folder and the notebooks are, and where progress is shown.
+    reports, console
+        Where reports on a flight's folder are, and where progress is shown.
 
     Returns
     -------
@@ -136,7 +135,7 @@ def share(
     zipped = zipped or password is not None
     if password is not None:
         check_password(password)
-    studies = load_studies(notebooks / "studies.toml")
+    studies = load_studies()
     sources, left_out = sources_of(report, studies, reports)
     if flight is None and (report / FILE_NAME).is_file():
         flight = report
@@ -163,7 +162,7 @@ def share(
     for source, name, one in zip(sources, calls, prepared, strict=True):
         first = 1 + sum(len(document.chapter.parts) for document in documents)
         if one is not None:
-            documents.append(_generalised(one, source, tier, first, words, notebooks, console))
+            documents.append(_generalised(one, source, tier, first, words, console))
         else:
             documents.append(_copied(source, tier, name, first))
     pages = _pages(documents, target, zipped, len(flights))
@@ -225,13 +224,12 @@ def _generalised(
     tier: Tier,
     first: int,
     words: Language | None,
-    notebooks: Path,
     console: Console | None,
 ) -> _Document:
     """A flight's reports, drawn again."""
     made, treatment, name = one.made, one.treatment, one.made.flight.name
     with private_folder() as work:
-        drawn = recompute_reports(one.flight, made, source, work, notebooks=notebooks, console=console)
+        drawn = recompute_reports(one.flight, made, source, work, console=console)
         parts = [
             read_part(folder / "report.html", number, exact=False, generalised=True)
             for number, folder in enumerate(drawn.folders.values(), first)
