@@ -22,7 +22,6 @@ from wildlab.analysis.overview import (
     Alarm,
     Issue,
     Overview,
-    beside_satellites,
     length_of_way,
     troubled_for,
 )
@@ -40,7 +39,7 @@ from wildlab.analysis.verdict import (
     verdict_of,
 )
 from wildlab.evaluation.streams import FINE, FLOOR_HZ, HARMFUL
-from wildlab.flight.clocks import MAX_GAP_S, USUAL_STEPS, gnss_times
+from wildlab.flight.clocks import MAX_GAP_S, USUAL_STEPS
 from wildlab.messages import quantities
 from wildlab.messages.catalogue import Message, load_texts
 from wildlab.messages.quantities import FORMS, metres, number, percent_of
@@ -51,8 +50,6 @@ from wildlab.reporting.report import Report, Wording
 
 #: Subject of what is recorded of the whole flight.
 FLIGHT = "flight"
-#: Positions closer than this are the same, but for rounding, m.
-SAME_M = 1e-3
 _UNITS = {"jumps": "m", "leans": "deg", "apart": "m", "shakes": "m/s^2"}
 
 
@@ -326,7 +323,7 @@ def streams_table(overview: Overview) -> pd.DataFrame:
 
 
 def satellites_table(overview: Overview) -> pd.DataFrame:
-    """What the receiver reports of its positions, and how far the poses are from them; maybe no rows."""
+    """What the receiver reports of its positions; maybe no rows."""
     gnss, rows = overview.flight.gnss, []
     names = load_texts("overview").quantities
     columns = {"satellites": "satellites", "sd_horizontal_m": "sd-horizontal", "sd_vertical_m": "sd-vertical"}
@@ -335,16 +332,6 @@ def satellites_table(overview: Overview) -> pd.DataFrame:
             values = gnss[column].to_numpy(float)
             worst = np.nanmin(values) if column == "satellites" else np.nanmax(values)
             rows.append({"what": names[key], "median": float(np.nanmedian(values)), "worst": float(worst)})
-    path = overview.path
-    if gnss is not None and path is not None and path.who.startswith("nav/") and path.timed:
-        gaps = overview.streams[path.who].gaps
-        _, off, _ = beside_satellites(overview.flight, path.times, path.place, gaps)
-        if len(off) and np.median(np.abs(off)) >= SAME_M:
-            level = np.hypot(off[:, 0], off[:, 1])
-            quantile = float(np.quantile(level, 0.95))
-            rows.append({"what": names["apart-level"], "median": float(np.median(level)), "worst": quantile})
-            above = float(np.median(-off[:, 2]))
-            rows.append({"what": names["apart-above"], "median": above, "worst": np.nan})
     return pd.DataFrame(rows, columns=["what", "median", "worst"])
 
 
@@ -518,20 +505,6 @@ def _figures_over_time(overview: Overview, clock: charts.Clock) -> Iterator[tupl
         yield "speed", charts.lines_chart(speed, clock, "speed (m/s)", floor=True)
     if attitude := overview.series["attitude"]:
         yield "attitude", charts.attitude_chart(attitude, clock)
-    gnss = overview.flight.gnss
-    if gnss is not None and len(gnss):
-        times = gnss_times(overview.flight)
-        known = np.isfinite(times)
-
-        def column(name: str) -> tuple[np.ndarray, np.ndarray] | None:
-            there = name in gnss and gnss[name].notna().any()
-            return (times[known], gnss[name].to_numpy(float)[known]) if there else None
-
-        satellites = column("satellites")
-        sd = {"each horizontal axis": column("sd_horizontal_m"), "height": column("sd_vertical_m")}
-        reported = {name: series for name, series in sd.items() if series is not None}
-        if satellites is not None or reported:
-            yield "satellites", charts.satellites_chart(satellites, reported, clock)
     if overview.vibration is not None:
         vibration, times = overview.vibration
         yield "shaking", charts.shaking_chart(vibration, times, clock)

@@ -42,7 +42,6 @@ from wildlab.reporting.published_tables import LONGEST, caption_of, claims_table
 from wildlab.reporting.status import Standing, standing
 from wildlab.reporting.text import PILLS, TAGS, csv_link, escape, inline, prose, slug, table_html
 
-LEVELS = ("good", "warn", "bad", "neutral")
 #: What is said where no number is known that anything could be said by.
 NOTHING_KNOWN = "Not known: there are too few observations."
 #: Points of an alert that are shown at once: what comes below must not leave the screen.
@@ -139,17 +138,11 @@ class Report:
         sentences
             The answer first.
         level
-            The colour of the bar: one of `LEVELS`.
+            The colour of the bar: "good", "warn", "bad" or "neutral".
         verdict
             The word that the colour means, and its reason in a sentence. Without one, `save` says how the
             numbers and claims of the study stand to the printed ones.
         """
-        if level not in LEVELS:
-            raise WildlabError(f"the level {level!r} is unknown", f"use one of: {', '.join(LEVELS)}")
-        if verdict is None and level != "neutral":
-            raise WildlabError(f"the colour {level!r} has no word", "give the verdict and its reason")
-        if not sentences:
-            raise WildlabError("the summary is empty", "give it a sentence")
         first, *others = [inline(one) for one in map(known, sentences) if one] or [NOTHING_KNOWN]
         text = " ".join([f"<b>{first.replace('<b>', '').replace('</b>', '')}</b>", *others])
         self._show(f'<section class="summary {level}" aria-label="Summary"><p>{text}</p></section>')

@@ -350,20 +350,6 @@ def _envelope(times: Array, values: Array) -> tuple[Array, Array, Array]:
     return times[edges], np.minimum.reduceat(values, edges), np.maximum.reduceat(values, edges)
 
 
-def satellites_chart(satellites: tuple[Array, Array] | None, sd: Series, clock: Clock) -> Figure:
-    """How many satellites, and how uncertain the positions are said to be, over time."""
-    count = (satellites is not None) + bool(sd)
-    fig, axes = new_strips(count, 1.6 + 1.5 * count)
-    if satellites is not None:
-        draw_line(axes[0], clock(satellites[0]), satellites[1], BLUE, drawstyle="steps-post")
-        axes[0].set(ylabel="satellites", ylim=(0, None))
-    if sd:
-        for (name, (times, values)), color in zip(sd.items(), LINES, strict=False):
-            draw_line(axes[-1], clock(times), values, color, name)
-        axes[-1].set(ylabel="stated SD (m)", ylim=(0, None))
-    return finish(fig, clock.label)
-
-
 def shaking_chart(level: Array, times: Array, clock: Clock) -> Figure:
     """Shaking of each axis over time by the measure of the limits, with these where they are in reach."""
     fig, ax = new_figure(4.6, 3.5)
