@@ -73,7 +73,7 @@ def page(scene: ReplayScene, shots: Mapping[int, bytes]) -> str:
             kind="A simulated flight" if scene.kind == "twin" else "A recorded flight",
             lasts=minutes(scene.length) if scene.timed else "",
             images=len(scene.views.times) if scene.views is not None else 0,
-            filters=_filters(scene),
+            filters={one["filter"]: one["colour"] for one in found["tracks"]},
             choices={key: list(dict.fromkeys(one[key] for one in found["tracks"])) for key in _CHOICES},
             preset="filter" if len(scene.tracks) > MOST_AT_ONCE else "",
             points=scene.points is not None,
@@ -95,11 +95,6 @@ def _thinned(scene: ReplayScene) -> list[str]:
 
 def _hash(text: str) -> str:
     return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
-
-
-def _filters(scene: ReplayScene) -> dict[str, str]:
-    """The colour of each filter by its name."""
-    return {filter_words(plain(one.filter)): colour(one.filter) for one in scene.tracks}
 
 
 def drawn(scene: ReplayScene, shots: Mapping[int, bytes]) -> dict[str, Any]:

@@ -171,7 +171,9 @@ def comparison_page(flights: Sequence[OwnFlight]) -> str:
     wording = Wording(report, load_texts("comparison"), {"n": len(flights)})
     texts, title = wording.texts.subjects, wording.say(wording.texts.subjects["title"])
     report.head(title, ", ".join(flight.name for flight in flights))
-    report.summary(wording.messages([_counted(flights)]), **_worst(flights, wording))
+    words = [pill_of(flight)[0] for flight in flights]
+    counts = "; ".join(f"{words.count(word)} {word}" for word in dict.fromkeys(words))
+    report.summary(wording.messages([Message("counted", {"counts": counts})]), **_worst(flights, wording))
     side = wording.texts.tables["flights"]
     report.section(side.title)
     names = {f"flight{k}": flight.name for k, flight in enumerate(flights)}
@@ -206,12 +208,6 @@ def _worst(flights: Sequence[OwnFlight], wording: Wording) -> dict[str, Any]:
         "verdict": (word.value, *wording.messages([Message("worst", {"flights": whose})])),
         "level": word.colour,
     }
-
-
-def _counted(flights: Sequence[OwnFlight]) -> Message:
-    words = [pill_of(flight)[0] for flight in flights]
-    counts = "; ".join(f"{words.count(word)} {word}" for word in dict.fromkeys(words))
-    return Message("counted", {"counts": counts})
 
 
 def _aligned(flights: Sequence[OwnFlight], texts: Mapping[str, str]) -> pd.DataFrame:

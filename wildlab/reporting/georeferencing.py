@@ -102,7 +102,8 @@ def record_accuracy(
     record_errors(report, "logged-pose", found.scored, found.intervals)
     diagnosis = found.diagnosis
     if diagnosis is not None:
-        _record_gain(report, "winner", diagnosis.winner.gain.gain, int(diagnosis.inliers.sum()))
+        gain, n = diagnosis.winner.gain.gain, int(diagnosis.inliers.sum())
+        report.metric("gain", "winner", gain.estimate, "m", n=n, low=gain.low, high=gain.high)
         if diagnosis.counts:
             record_summary(report, "calibrated-pose", diagnosis.held_summary())
     if diagnosis and diagnosis.outliers and diagnosis.inliers.any():
@@ -116,10 +117,6 @@ def record_accuracy(
         subject = "recorded-answers" if len(answers) == 1 else f"recorded-answers/{program}"
         others[program] = record_errors(report, subject, table)
     return others
-
-
-def _record_gain(report: Report, subject: str, gain: Any, n: int) -> None:
-    report.metric("gain", subject, gain.estimate, "m", n=n, low=gain.low, high=gain.high)
 
 
 def named(tables: Mapping[str, pd.DataFrame], kind: str, *, shown: bool) -> dict[str, pd.DataFrame]:

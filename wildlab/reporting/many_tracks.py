@@ -68,11 +68,6 @@ def false_share(lives: Identities) -> float:
     return float(np.mean([one.n_false > 0 for one in lives.gospa]))
 
 
-def judged_nees(lives: Identities) -> list[float]:
-    """Mean NEES / 2 of the tracks that have enough of them to be judged."""
-    return [one.anees / 2 for one in lives.tracks.values() if one.compared >= FEWEST]
-
-
 def counted(count: Count) -> str:
     """An interval of a number of targets.
 
@@ -157,7 +152,8 @@ def reason(followed: ManyTracks, lives: Identities | None) -> Message:
     seen = [] if lives is None else [life for life in lives.targets.values() if life.visible]
     if lives is None or not seen:
         return Message("reason-unjudged")
-    nees = judged_nees(lives)
+    # Of the tracks that have enough of them to be judged.
+    nees = [one.anees / 2 for one in lives.tracks.values() if one.compared >= FEWEST]
     false = sum(track.false for track in lives.tracks.values())
     counts = (
         ("swaps", lives.swaps, len(lives.tracks)),

@@ -46,8 +46,8 @@ from wildlab.reporting.text import PILLS, TAGS, csv_link, escape, inline, prose,
 NOTHING_KNOWN = "Not known: there are too few observations."
 #: Points of an alert that are shown at once: what comes below must not leave the screen.
 ALERTS_SHOWN = 3
-#: Rows in sight of a table that has more than `LONGEST`; the others are folded.
-ROWS_SHOWN = 9
+#: Rows in sight of a table that has more than so many; the others are folded.
+ROWS_SHOWN, WHOLE = 9, 24
 _FILE_NAME = re.compile(r"[a-z0-9][a-z0-9-]*")
 
 
@@ -248,7 +248,7 @@ class Report:
         self._tables += 1
         name, caption = f"Table {self._tables}", known(caption)
         # A table behind a fold is whole.
-        shown = len(frame) if fold or len(frame) <= LONGEST else ROWS_SHOWN
+        shown = len(frame) if fold or len(frame) <= WHOLE else ROWS_SHOWN
         about: tuple[Any, ...] = (columns or {}, digits, caption or fold or name)
         body = str(table_html(frame[:shown], *about))
         if len(frame) > shown:

@@ -142,7 +142,9 @@ def _earlier(ones: Sequence[OwnReport], made_from: Mapping[str, Mapping[str, Any
     old = {
         one.folder
         for one in ones
-        if one.finished < newest.finished and _differ(tables_of(made_from[one.folder].get("flight")), tables)
+        if one.finished < newest.finished
+        and tables_of(made_from[one.folder].get("flight")) not in ({}, tables)
+        and tables
     }
     overview = next((one for one in ones if one.about == "overview" and one.folder not in old), None)
     parameters = made_from[overview.folder].get("parameters") if overview is not None else None
@@ -155,10 +157,6 @@ def _earlier(ones: Sequence[OwnReport], made_from: Mapping[str, Mapping[str, Any
         for one in ones
         if one.about in known and one.folder not in beside and one.finished < overview.finished
     }
-
-
-def _differ(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
-    return bool(one) and bool(other) and one != other
 
 
 def _report(folder: Path, flight: str, provenance: dict[str, Any]) -> OwnReport:

@@ -34,12 +34,12 @@ from wildlab.runner.status import AGAIN, BEFORE_DIGESTS, FILES, STATUS, has_dige
 SHOWN_BY = (*PACKAGES, "matplotlib", "papermill")
 
 
-def git_state(root: Path | None = ROOT) -> dict[str, Any]:
+def git_state() -> dict[str, Any]:
     """``{"commit": 40 hex digits or None, "dirty": bool or None, "note": "" or why there is none}``.
 
-    ``root`` is the checkout; None where there is none, and the version alone says what the code was.
+    Where there is no checkout, the version alone says what the code was.
     """
-    if root is None:
+    if ROOT is None:
         return {"commit": None, "dirty": None, "note": "installed from a wheel"}
     git = shutil.which("git")
     if git is None:
@@ -48,7 +48,7 @@ def git_state(root: Path | None = ROOT) -> dict[str, Any]:
     def ask(*arguments: str) -> str:
         return subprocess.run(  # noqa: S603 - a fixed program, found above, with fixed arguments
             [git, *arguments],
-            cwd=root,
+            cwd=ROOT,
             env=os.environ | {"GIT_OPTIONAL_LOCKS": "0"},
             capture_output=True,
             text=True,
@@ -60,7 +60,7 @@ def git_state(root: Path | None = ROOT) -> dict[str, Any]:
         top = Path(ask("rev-parse", "--show-toplevel")).resolve()
         # A copy without its history may lie inside somebody else's repository, whose commit says nothing
         # about it.
-        if top != root.resolve():
+        if top != ROOT.resolve():
             return {"commit": None, "dirty": None, "note": "not a git checkout"}
         return {"commit": ask("rev-parse", "HEAD"), "dirty": bool(ask("status", "--porcelain")), "note": ""}
     except (subprocess.SubprocessError, OSError):

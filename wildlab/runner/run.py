@@ -143,9 +143,12 @@ def _seed_work(
     case = study.shown_case()
     if case is None:
         return None
-    twin = study.twin if flight is None else _twin_of(flight)
-    if flight is not None and twin is None:
-        return None  # a logged flight is the only one of its kind
+    twin = study.twin
+    if flight is not None:
+        simulated = read_manifest(flight / FILE_NAME).twin
+        if simulated is None:
+            return None  # a logged flight is the only one of its kind
+        twin = simulated.name
     given = {**parameters, "twin": twin}
     return make_work(reports, name, case.case, seed, parameters["seeds"], given)
 
@@ -312,12 +315,6 @@ def run_all(
 
 def _flight_name(folder: Path) -> str:
     return flight_name(folder, read_manifest(folder / FILE_NAME).name)
-
-
-def _twin_of(folder: Path) -> str | None:
-    """Name of the twin that a flight folder was simulated from; None for a logged flight."""
-    twin = read_manifest(folder / FILE_NAME).twin
-    return None if twin is None else twin.name
 
 
 def _absent_data(study: StudyEntry) -> WildlabError | None:

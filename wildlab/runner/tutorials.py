@@ -45,7 +45,6 @@ def run_tutorials(
     notebooks: Path = NOTEBOOKS,
     *,
     parallel: int = 1,
-    timeout_s: float = 600.0,
     console: Console | None = None,
 ) -> list[Outcome]:
     """Run the tutorials whose pages are not there or out of date, and write their pages.
@@ -58,8 +57,6 @@ def run_tutorials(
         Where the tutorials are, in ``tutorials``.
     parallel
         How many at once.
-    timeout_s
-        How long each may take.
     console
         Where progress is shown; nowhere if not given.
 
@@ -79,7 +76,7 @@ def run_tutorials(
     reports = reports.resolve()
     (reports / "tutorials").mkdir(parents=True, exist_ok=True)
     marks = {path: _mark(path) for path in found}
-    jobs = {path: _job(path, reports, timeout_s) for path in found if not _kept(path, reports, marks[path])}
+    jobs = {path: _job(path, reports) for path in found if not _kept(path, reports, marks[path])}
     # A terminal shows a bar; elsewhere each has a line of its own.
     if console is not None:
         with shown(console) as listen:
@@ -91,7 +88,7 @@ def run_tutorials(
     return outcomes
 
 
-def _job(path: Path, reports: Path, timeout_s: float) -> Job:
+def _job(path: Path, reports: Path) -> Job:
     name = f"tutorial-{path.stem}"
     return Job(
         name=name,
@@ -100,7 +97,7 @@ def _job(path: Path, reports: Path, timeout_s: float) -> Job:
         work=str(reports / f".{name}.{os.getpid()}.part"),
         reports=str(reports),
         again="python -m wildlab.runner.tutorials",
-        timeout_s=timeout_s,
+        timeout_s=600.0,
         cells=len(read_notebook(path).cells),
         tutorial=True,
     )
