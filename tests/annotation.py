@@ -13,8 +13,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from wildlab.runner.annotation.server import ClickServer, open_server
-from wildlab.runner.annotation.session import Session
+from wildlab.runner.annotation import ClickServer, Session, open_server
 
 HOSTILE = "z<img src=x onerror=alert(1)>.png"
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
-from wildlab.runner.processes.ending import ONE_THREAD
+from wildlab.runner.processes import ONE_THREAD
 
 # Before numpy and OpenCV are imported: their threads take the cores of other test processes, and make small
 # matrices slower, not faster.

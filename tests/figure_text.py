@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.text import Annotation, Text
 from matplotlib.transforms import Bbox
 
@@ -53,11 +54,41 @@ def _not_drawn(figure: Figure) -> set[int]:
     return hidden
 
 
+def signs(figure: Figure) -> list[tuple[str, Bbox]]:
+    """The sign of every entry of a legend, with its box in points."""
+    legends = [*figure.legends, *filter(None, (axes.get_legend() for axes in figure.get_axes()))]
+    found = []
+    for legend in legends:
+        for handle, text in zip(legend.legend_handles, legend.get_texts(), strict=True):
+            assert handle is not None
+            box = _drawn(handle) if isinstance(handle, Line2D) else handle.get_window_extent()
+            found.append((f"the sign of {text.get_text()!r}", Bbox(box.get_points() * 72.0 / figure.dpi)))
+    return found
+
+
+def _drawn(line: Line2D) -> Bbox:
+    """What a line of a legend covers, pixels: itself, and the marker in its middle."""
+    places = line.get_transform().transform(line.get_xydata())
+    figure = line.get_figure()
+    assert figure is not None
+    pixels = figure.dpi / 72.0
+    boxes = []
+    if line.get_linestyle() not in ("None", "none", "", " "):
+        half = [0.0, line.get_linewidth() * pixels / 2]
+        boxes.append(Bbox([places.min(axis=0) - half, places.max(axis=0) + half]))
+    if line.get_marker() not in ("None", "none", "", " ", None):
+        half = line.get_markersize() * pixels / 2
+        middle = places[len(places) // 2]
+        boxes.append(Bbox([middle - half, middle + half]))
+    return Bbox.union(boxes)
+
+
 def overlapping(figure: Figure) -> list[str]:
-    """Pairs of texts that lie on one another, and texts that leave the figure, in words."""
+    """Pairs of texts, and of a legend's signs, that lie on one another, and texts that leave the figure, in
+    words."""
     boxes = written(figure)
     found = []
-    for (one, a), (other, b) in combinations(boxes, 2):
+    for (one, a), (other, b) in combinations([*boxes, *signs(figure)], 2):
         wide = min(a.x1, b.x1) - max(a.x0, b.x0)
         high = min(a.y1, b.y1) - max(a.y0, b.y0)
         if wide > TOUCH and high > TOUCH:

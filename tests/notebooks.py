@@ -9,7 +9,7 @@ import nbformat
 
 from wildlab.paths import NOTEBOOKS
 from wildlab.reporting.report import Report
-from wildlab.runner.processes.shell import execute_notebook
+from wildlab.runner.shell import execute_notebook
 
 PARAMETERS = 'study = ""\nflight = ""\nseed = 0\nout = ""'
 OPEN = (

@@ -25,11 +25,14 @@ from tests.commands import call
 from wildlab.flight.readers import read_log
 from wildlab.flight.readers.frames.image import read_image
 from wildlab.flight.store import load_flight, save_flight
-from wildlab.runner.annotation.server import (
+from wildlab.runner.annotation import (
     ClickServer,
+    Session,
     open_server,
+    open_session,
+    read_points,
+    table_of,
 )
-from wildlab.runner.annotation.session import Session, open_session, read_points, table_of
 
 
 @pytest.fixture

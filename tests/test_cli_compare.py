@@ -17,8 +17,7 @@ from tests.sharing.left import leave_report
 from wildlab.flight.store import save_flight
 from wildlab.reporting.comparison import QUANTITIES
 from wildlab.reporting.metrics import metric
-from wildlab.runner.record.front_page import build_ledger
-from wildlab.runner.record.own_flights import own_flights
+from wildlab.runner.ledger import build_ledger, own_flights
 from wildlab.simulation.twins import simulate_twin
 
 

@@ -11,7 +11,7 @@ import pytest
 from tests.commands import refuse, succeed
 from wildlab.analysis.tracks.tracker import COLUMNS
 from wildlab.flight.store import save_flight
-from wildlab.runner.record.provenance import provenance_of_flight
+from wildlab.runner.provenance import provenance_of_flight
 from wildlab.simulation.twins import simulate_twin
 
 POSES = ("--source", "autopilot")

@@ -19,7 +19,7 @@ from pathlib import Path
 import pdoc
 
 from wildlab.runner.catalogue import load_studies
-from wildlab.runner.record.front_page import build_ledger
+from wildlab.runner.ledger import build_ledger
 
 ROOT = Path(__file__).resolve().parents[1]
 INTO = ROOT / "reports" / "reference"

@@ -105,7 +105,7 @@ function drawMap() {
     }
     ctx.globalAlpha = 1;
   }
-  for (const one of scene.tracks) {
+  for (const one of shownTracks()) {
     const i = last(one.t, now);
     if (i < 0) continue;
     line(ctx, to, pieces(one, i), one.colour, 1.2, .6);
@@ -159,9 +159,13 @@ function drawImage() {
 const told = t => !scene.timed ? "image " + Math.round(t)
   : Math.floor(t / 60) + ":" + String(Math.floor(t % 60)).padStart(2, "0") + " min";
 
+// All tracks, or those of the target and by the filter that were chosen.
+const choices = ["target", "filter"].map(key => [key, at(key)]);
+const shownTracks = () => scene.tracks.filter(one => choices.every(([key, box]) => !box.value || box.value === one[key]));
+
 // Of each strip its name, the series in it, whether its scale is logarithmic, and a band.
 function rows() {
-  const judged = scene.tracks.length ? scene.tracks : scene.points ? [{...scene.points, colour: colour("points"), dots: true}] : [];
+  const judged = scene.tracks.length ? shownTracks() : scene.points ? [{...scene.points, colour: colour("points"), dots: true}] : [];
   const found = [["Error (m)", judged.map(one => [one, one.error]), true, null],
                  ["NEES, dashed: 95 %", judged.map(one => [one, one.nees]), true, scene.band]];
   if (scene.path) found.push(["Height above ground (m)", [[{...scene.path, colour: colour("flown")}, scene.path.height]], false, null]);
@@ -169,7 +173,9 @@ function rows() {
 }
 
 function drawStrips() {
-  const [ctx, w, h] = begin(strips), all = rows(), each = (h - 18) / Math.max(all.length, 1), left = 44;
+  const all = rows(), each = 150, left = 44;
+  strips.style.height = all.length * each + 18 + "px";
+  const [ctx, w, h] = begin(strips);
   const x = t => left + t / (scene.length || 1) * (w - left - 8);
   strips.hidden = !all.length;
   all.forEach(([label, series, log, band], k) => {
@@ -234,7 +240,7 @@ function nearer(factor) {
 }
 // What one comes closer to: the latest estimate, target or detection, else the aircraft.
 function nowSeen() {
-  for (const one of [...scene.tracks, ...(scene.points ? [scene.points] : [])]) {
+  for (const one of [...shownTracks(), ...(scene.points ? [scene.points] : [])]) {
     const i = last(one.t, now);
     if (i >= 0) return one.p[i];
   }
@@ -244,6 +250,7 @@ function nowSeen() {
 slider.max = scene.length || 1; slider.step = (scene.length || 1) / 2000;
 slider.addEventListener("input", () => { now = Number(slider.value); draw(); });
 play.addEventListener("click", toggle);
+choices.forEach(([, box]) => box.addEventListener("change", draw));
 at("closer").addEventListener("click", () => nearer(2));
 at("farther").addEventListener("click", () => nearer(.5));
 at("whole").addEventListener("click", () => { zoom = 1; middle = null; draw(); });

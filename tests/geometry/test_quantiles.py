@@ -30,7 +30,7 @@ def test_the_tail_is_that_of_scipy_stats(value, dof):
 
 @pytest.mark.slow
 def test_a_report_does_without_scipy_stats():
-    rooms = "reporting.report", "analysis.accuracy", "analysis.navigate", "runner.processes.job"
+    rooms = "reporting.report", "analysis.accuracy", "analysis.navigate", "runner.job"
     imports = "; ".join(f"import wildlab.{room}" for room in rooms)
     code = f"import sys; {imports}; print('scipy.stats' in sys.modules)"
     said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

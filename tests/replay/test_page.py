@@ -113,6 +113,38 @@ def test_names_do_nothing_and_nothing_is_asked_for():
     assert not re.search(r"""(?:src|href)=(?!["']data:)""", text)
 
 
+def many(scene: ReplayScene) -> ReplayScene:
+    """The same with three targets, each by three filters."""
+    (one,) = scene.tracks
+    names = [(target, name) for target in ("a", "<b>", "c") for name in ("ekf", "ukf", "imm")]
+    return replace(scene, tracks=tuple(one._replace(target=a, filter=b) for a, b in names))
+
+
+def test_of_many_tracks_those_of_one_filter_are_shown_first():
+    few, text = page(scene_of_a_minute("x"), {}), page(many(scene_of_a_minute("x")), {})
+    assert "<option selected>white noise (EKF)</option>" in text and "<option>&lt;b&gt;</option>" in text
+    assert "selected" not in few and few.count("<label hidden>") == 2
+    tracks = drawn(many(scene_of_a_minute("x")), {})["tracks"]
+    assert {(one["target"], one["filter"]) for one in tracks} >= {("<b>", "white noise (UKF)")}
+
+
+def test_tracks_are_chosen_and_panels_are_high_enough_to_be_read(browser: Any, tmp_path):
+    file = tmp_path / "replay.html"
+    file.write_text(page(many(scene_of_a_minute("x")), {}), encoding="utf-8")
+    for width in (400, 1200):
+        opened = browser.new_page(viewport={"width": width, "height": 800})
+        opened.goto(file.as_uri())
+        assert opened.evaluate("shownTracks().length") == 3
+        opened.select_option("#target", "<b>")
+        assert opened.evaluate("shownTracks().map(one => one.target + one.filter)") == [
+            "<b>white noise (EKF)"
+        ]
+        opened.select_option("#filter", "")
+        assert opened.evaluate("shownTracks().length") == 3
+        assert opened.locator("#strips").bounding_box()["height"] > 3 * 120
+        opened.close()
+
+
 def test_it_plays_and_zooms_in_a_browser(browser: Any, faults: Callable[[Path], list[str]], tmp_path):
     file = tmp_path / "replay.html"
     file.write_text(page(scene_of_a_minute(), shots(61)), encoding="utf-8")

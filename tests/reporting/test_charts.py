@@ -6,23 +6,24 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.collections import EllipseCollection
 
 from wildlab.analysis.overview import Path
 from wildlab.analysis.tracks.single_target import SensorTrack
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.geometry.frames import Array
-from wildlab.reporting.charts.following import map_shown
-from wildlab.reporting.charts.navigation import (
+from wildlab.reporting.charts.flights import (
+    Clock,
     error_bands,
+    lines_chart,
     squares_chart,
 )
-from wildlab.reporting.charts.overview import Clock, lines_chart
-from wildlab.reporting.charts.tracks import (
-    speed_and_course,
-)
+from wildlab.reporting.charts.tracks import error_map, map_shown, speed_and_course
+from wildlab.reporting.georeferencing_tables import worst_images
 from wildlab.reporting.overview import way_of
 
 N = 200
@@ -145,3 +146,32 @@ def test_the_length_of_a_path_is_that_of_its_course_however_it_shakes():
 @given(st.floats(-1e5, 2e9))
 def test_no_clock_has_a_say_in_the_length_of_a_path(since):
     assert way_of(circling(since, 0.5)) == pytest.approx(way_of(circling(0.0, 0.5)), rel=1e-9)
+
+
+def test_a_map_of_errors_has_every_ellipse_and_the_worst_images_by_number():
+    n = 40
+    scored = pd.DataFrame(
+        {
+            "frame_id": [f"f{k // 2}" for k in range(n)],
+            "north_m": np.arange(n) * 10.0,
+            "east_m": 0.0,
+            "error_north_m": 0.0,
+            "error_east_m": np.arange(n) * 1.0,
+            "error_m": np.arange(n) * 1.0,
+            "cov_nn": 4.0,
+            "cov_ne": 0.0,
+            "cov_ee": 1.0,
+        }
+    )
+    scored.loc[3, ["north_m", "east_m", "error_m"]] = np.nan
+    worst = worst_images(scored)
+    assert list(worst["image"][:2]) == ["f19", "f18"] and list(worst["number"]) == list(range(1, 11))
+    assert worst["mean"].iloc[0] == 38.5 and worst["max"].iloc[0] == 39.0
+    ax = error_map(scored, list(worst["image"])).axes[0]
+    (ellipses,) = (one for one in ax.collections if isinstance(one, EllipseCollection))
+    # The long axis, north, is the width that is turned upright.
+    assert len(ellipses.get_offsets()) == n - 1
+    assert ellipses._angles == pytest.approx(np.pi / 2) and ellipses._widths[0] == pytest.approx(
+        4.292, abs=1e-3
+    )
+    assert {one.get_text(): one.xy for one in ax.texts if one.get_text().isdigit()}["1"] == (0.0, 390.0)

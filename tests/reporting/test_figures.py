@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from tests.figure_text import overlapping
 from tests.reporting.test_html import contrast
 from wildlab.reporting import figures
-from wildlab.reporting.charts import drawing, navigation, tracks
+from wildlab.reporting.charts import drawing, flights, tracks
 from wildlab.reporting.figures import PHONE_WIDTH, least_size
 
 
@@ -61,7 +61,7 @@ def walk(rng: np.random.Generator, *shape: int) -> np.ndarray:
 def strips_of(rng: np.random.Generator) -> Figure:
     one = {"roll (°)": walk(rng, 181), "pitch (°)": walk(rng, 181)}
     sources = dict.fromkeys(("mekf", "truth", "autopilot", "observer"), (TIMES, one))
-    return navigation.strips(sources)
+    return flights.strips(sources)
 
 
 def scored(rng: np.random.Generator) -> pd.DataFrame:
@@ -100,12 +100,12 @@ CHARTS: dict[str, Draw] = {
         NAMES,
     ),
     "strips": strips_of,
-    "bands": lambda rng: navigation.error_bands(
+    "bands": lambda rng: flights.error_bands(
         TIMES, {name: walk(rng, 181, 3) for name in ("mekf", "observer")},
         {"mekf": rng.gamma(2, 1, (181, 3))}, ["roll (°)", "pitch (°)", "yaw (°)"],
     ),
-    "biases": lambda rng: navigation.bias_chart(TIMES, walk(rng, 181, 6), rng.gamma(2, 1, (181, 6))),
-    "nis": lambda rng: navigation.squares_chart(
+    "biases": lambda rng: flights.bias_chart(TIMES, walk(rng, 181, 6), rng.gamma(2, 1, (181, 6))),
+    "nis": lambda rng: flights.squares_chart(
         {name: (TIMES, rng.chisquare(3, 181)) for name in ("position", "velocity")}, 3, "NIS"
     ),
     "flights": lambda rng: drawing.rows_chart(
@@ -165,3 +165,17 @@ def test_signs_of_a_legend_keep_their_size_in_fewer_columns():
     figures.fit_text(fig)
     assert fig.legends[0]._ncols < 4
     assert {one.get_markersize() for one in fig.legends[0].legend_handles} == before == {9.0}
+
+
+def test_signs_of_a_legend_that_lie_on_one_another_or_on_words_are_found():
+    def drawn(size: float) -> list[str]:
+        fig, ax = figures.new_figure()
+        for name in "ab":
+            ax.plot([0, 1], [0, 1], "o-", ms=size, label=name)
+        fig.legend(loc="outside lower center")
+        figures.fit_text(fig)
+        return overlapping(fig)
+
+    assert drawn(12.0) == []
+    assert {"the sign of 'a'" in one and "the sign of 'b'" in one for one in drawn(22.0)} == {True}
+    assert any(one.startswith("'a' lies on \"the sign of 'a'") for one in drawn(44.0))

@@ -94,7 +94,7 @@ def test_the_cause_is_named_by_its_measured_gain_alone(winner, key):
 def test_no_cause_is_named_where_nobody_could_look_or_too_many_are_outliers():
     assert page.cause_message(None).key == "cause-untried"
     many = page.cause_message(diagnosis(MOST, out=6))
-    assert many.key == "cause-outliers" and many.values == {"out": "6", "points": "20"}
+    assert many.key == "cause-outliers" and many.values == {"out": 6, "points": 20}
 
 
 def test_a_cause_that_another_explains_as_well_does_not_count():

@@ -15,7 +15,7 @@ from tests.notebooks import notebook, shown
 from wildlab.errors import WildlabError
 from wildlab.reporting import notebook_pages as html
 from wildlab.reporting.figures import new_figure
-from wildlab.reporting.layout import (
+from wildlab.reporting.notebook_pages import (
     ADVICE,
     LIMITS,
     METHOD,

@@ -16,7 +16,7 @@ from wildlab.evaluation.identities import Identities, Moment, TargetLife, TrackL
 from wildlab.messages.catalogue import load_texts
 from wildlab.reporting import figures
 from wildlab.reporting import many_tracks as page
-from wildlab.reporting.charts import following as charts
+from wildlab.reporting.charts import tracks as charts
 from wildlab.reporting.figures import PHONE_WIDTH, least_size
 from wildlab.tracking.many import POINT, Hull, Shown
 

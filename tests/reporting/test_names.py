@@ -22,11 +22,11 @@ from tests.reporting.test_many_tracks import made
 from wildlab.analysis.detectors import TABLE_COLUMNS
 from wildlab.files import csv_text, read_csv
 from wildlab.names import FORMULA
-from wildlab.reporting.charts import drawing, following, navigation, overview, tracks
+from wildlab.reporting.charts import drawing, flights, tracks
 from wildlab.reporting.detections import precision_over_recall
 from wildlab.reporting.figures import _harmless as _harmless_texts
 from wildlab.reporting.text import csv_link
-from wildlab.runner.annotation.session import Point, Session
+from wildlab.runner.annotation import Point, Session
 
 PACKAGE = Path(wildlab.__file__).parent
 HOSTILE = [
@@ -133,21 +133,21 @@ def figures_of(one: str, other: str) -> Iterator[tuple[Figure, set[str]]]:
         ]
     )
     known: Any = SimpleNamespace(tracks=pair)
-    yield following.map_shown(known, other, "ekf", WAY[:, :2], {f"{one}x": WAY[:, :2]})[0], {one, f"{one}x"}
-    yield following.squares_shown(pair, rows, "nees")[0], set()
-    yield following.errors_shown(pair, rows)[0], set()
-    white = following.whiteness_shown(pair, ("range", one))
+    yield tracks.map_shown(known, other, "ekf", WAY[:, :2], {f"{one}x": WAY[:, :2]})[0], {one, f"{one}x"}
+    yield tracks.squares_shown(pair, rows, "nees")[0], set()
+    yield tracks.errors_shown(pair, rows)[0], set()
+    white = tracks.whiteness_shown(pair, ("range", one))
     assert white is not None
     yield white[0], set()
     followed, lives = made(1, tracks=3, looks=12, name=one.replace("{", "").replace("}", "") + "{}")
-    for figure in (following.tracks_shown(followed), following.identities_shown(followed, lives)):
+    for figure in (tracks.tracks_shown(followed), tracks.identities_shown(followed, lives)):
         yield figure[0], set()
     poses = {name: (TIMES, {"roll (°)": TIMES, "yaw (°)": TIMES}) for name in (one, f"{other}'")}
-    yield navigation.strips(poses), {one, f"{other}'"}
+    yield flights.strips(poses), {one, f"{other}'"}
     error = {one: WAY[:, :3]}
-    yield navigation.error_bands(TIMES, error, error, ["a", "b", "c"]), set()
-    clock = overview.Clock(0.0, TIMES[-1])
-    yield overview.lines_chart({one: (TIMES, TIMES), f"{other}'": (TIMES, TIMES)}, clock, one), {one}
+    yield flights.error_bands(TIMES, error, error, ["a", "b", "c"]), set()
+    clock = flights.Clock(0.0, TIMES[-1])
+    yield flights.lines_chart({one: (TIMES, TIMES), f"{other}'": (TIMES, TIMES)}, clock, one), {one}
     yield tracks.track_map(WAY, {"a": WAY}, {"a": one}), {one}
     yield drawing.rows_chart([one, other], {"": drawing.Values([1.0, 2.0])}, one, size=(4.6, 2.0)), set()
     curves = pd.DataFrame({"detector": [one, one], "recall": [0.1, 0.2], "precision": [1.0, 0.9]})

@@ -64,6 +64,16 @@ def test_table_has_digits_and_says_what_is_not_known():
         one.table(frame, columns={"nope": "x"})
 
 
+def test_of_a_long_table_the_first_rows_are_in_sight_and_all_are_in_the_file():
+    shown = report()
+    shown.table(pd.DataFrame({"track": [f"track {k}" for k in range(45)], "m": np.arange(45.0)}))
+    shown.table(pd.DataFrame({"m": np.arange(24.0)}))
+    long, short = (BeautifulSoup(part, "html.parser") for part in shown.parts)
+    assert len(long.select("figure > details tbody tr")) == 36 and short.details is None
+    link = str(long.find("a", class_="data")["href"]).partition(",")[2]
+    assert len(base64.b64decode(link).splitlines()) == 46
+
+
 def test_published_values_are_looked_up(tmp_path):
     one = report(tmp_path)
     one.metric("interval_low", "nees-1-run", 0.4844, "")

@@ -66,7 +66,7 @@ def test_every_track_that_is_surprised_is_counted():
     odd = {"nis": 18.0, "nis_verdict": "overconfident"}
     both = pd.concat([rows(**odd), rows(target="b", nees=5.6, verdict="overconfident", **odd)])
     beside = page.answer(both, [])[1]
-    assert beside.key == "surprised" and beside.values == {"tracks": "2", "n": "2", "times": "3.0"}
+    assert beside.key == "surprised" and beside.values == {"tracks": 2, "n": 2, "times": "3.0"}
     mine = both[both["filter"] == "schmidt"]
     assert page.tracks_table(mine)[["verdict", "nis_verdict"]].to_numpy().tolist() == [
         ["consistent", "overconfident"],
@@ -110,7 +110,7 @@ def test_what_could_not_be_judged_is_in_no_number_and_makes_nothing_sound():
     others = [rows(target=f"t{k}", rmse=40.0, nees=30.0, verdict="not judged").iloc[1:] for k in range(9)]
     many = pd.concat([rows().iloc[1:], *others])
     first = page.answer(many, [])[0]
-    assert first.key == "errors-mixed" and (first.values["judged"], first.values["rmse"]) == ("1", "4.0 m")
+    assert first.key == "errors-mixed" and (first.values["judged"], first.values["rmse"]) == (1, "4.0 m")
     assert colour(many) != "good" == colour(pd.concat([rows().iloc[1:], *others[:0]]))
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from wildlab.evaluation.replication import Closeness, Comparison, Compatibility
 from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY, MOSTLY_NOT, NO_PREMISE, UNDECIDED
-from wildlab.reporting.published import bounds_of, share_below, spread_key
+from wildlab.reporting.published import bounds_of, spread_key
 from wildlab.reporting.report import open_report
 from wildlab.reporting.status import (
     ALONE,
@@ -76,12 +76,6 @@ def test_few_flights_have_a_range_and_many_the_prediction_interval_of_one_more(n
     values, rank = FLIGHTS[:n], max((n + 1) // 20, 1)
     assert bounds_of(values) == (np.sort(values)[rank - 1], np.sort(values)[-rank])
     assert spread_key(n) == ("lowest to highest" if n < 19 else "middle 90 %")
-
-
-def test_flights_on_a_printed_number_count_by_halves():
-    values = pd.Series([1.0, 2.0, 2.0, 5.0, np.nan])
-    assert [share_below(values, one) for one in (0.5, 2.0, 3.0, 9.0)] == [0.0, 0.5, 0.75, 1.0]
-    assert np.isnan(share_below(values[:0], 1.0))
 
 
 @pytest.mark.parametrize("n", [1, 18, 19])

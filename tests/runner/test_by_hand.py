@@ -17,7 +17,7 @@ from wildlab.paths import NOTEBOOKS
 from wildlab.runner import flights
 from wildlab.runner.catalogue import StudyEntry, load_studies
 from wildlab.runner.open_study import open_study
-from wildlab.runner.processes.shell import CellError
+from wildlab.runner.shell import CellError
 
 STUDIES = load_studies(NOTEBOOKS / "studies.toml")
 

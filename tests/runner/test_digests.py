@@ -20,13 +20,11 @@ from wildlab.reporting import notebook_pages as html
 from wildlab.reporting.metrics import metric
 from wildlab.reporting.report import open_report
 from wildlab.runner.compare import compare_flights
-from wildlab.runner.processes.job import FILES
-from wildlab.runner.record.digests import misfits, read_status, seal
-from wildlab.runner.record.own_flights import own_flights
-from wildlab.runner.record.provenance import changed_notice, footer, provenance_of_flight
-from wildlab.runner.record.status import as_plain, study_status
+from wildlab.runner.job import FILES
+from wildlab.runner.ledger import own_flights
+from wildlab.runner.provenance import changed_notice, footer, provenance_of_flight, verify_report
 from wildlab.runner.seeds import SeedWork, read_seed, write_seed
-from wildlab.runner.verification import verify_report
+from wildlab.runner.status import as_plain, misfits, read_status, seal, study_status
 from wildlab.sharing.reports import sources_of
 
 NUMBERS = [metric("rmse", f"part-{n}", 1.5 + n / 7, "m", n=20, low=0.5, high=9.0) for n in range(12)]

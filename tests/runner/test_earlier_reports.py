@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from wildlab.runner.record.own_flights import own_flights
+from wildlab.runner.ledger import own_flights
 
 
 def report(folder: Path, hour: int, table: str, beside: list[str] | None = None) -> None:

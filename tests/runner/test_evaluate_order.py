@@ -9,8 +9,8 @@ from typing import Any
 from tests.analysis.robots import robot_flight
 from wildlab.flight.store import save_flight
 from wildlab.runner import evaluate
-from wildlab.runner.processes.job import Job
-from wildlab.runner.processes.scheduling import Outcome
+from wildlab.runner.job import Job
+from wildlab.runner.scheduling import Outcome
 
 
 def test_long_ones_begin_first_and_the_overview_waits_for_all(tmp_path, monkeypatch):

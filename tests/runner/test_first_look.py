@@ -14,9 +14,9 @@ from tests.notebooks import OPEN, notebook, write
 from wildlab.paths import NOTEBOOKS
 from wildlab.runner import run as running
 from wildlab.runner.catalogue import FIRST_LOOK_SEEDS, load_studies
-from wildlab.runner.processes.job import Job
-from wildlab.runner.processes.scheduling import Outcome
+from wildlab.runner.job import Job
 from wildlab.runner.run import THERE, has_whole_report, make_job, plan_passes, run_studies
+from wildlab.runner.scheduling import Outcome
 from wildlab.runner.seeds import write_seed
 
 STUDIES = load_studies(NOTEBOOKS / "studies.toml")

@@ -24,8 +24,8 @@ from wildlab.reporting.published import published_rows
 from wildlab.reporting.published_tables import CALCULATIONS, count_answers
 from wildlab.reporting.status import StudyStatus
 from wildlab.runner.catalogue import StudyEntry, load_studies
-from wildlab.runner.record.front_page import build_ledger
-from wildlab.runner.record.status import study_status
+from wildlab.runner.ledger import build_ledger
+from wildlab.runner.status import study_status
 
 PAGES = ("index.html", "ledger.html", "flights.html", "partners.html")
 #: A word that would run, were it not only text.

@@ -18,8 +18,8 @@ from tests.notebooks import notebook, write
 from wildlab.files import write_atomic, write_json
 from wildlab.paths import ROOT
 from wildlab.reporting import notebook_pages as privacy
-from wildlab.runner.processes import job as outputs
-from wildlab.runner.record import provenance
+from wildlab.runner import job as outputs
+from wildlab.runner import provenance
 
 DONE = {"study": "s", "state": "done", "reason": "", "seconds": 1.0}
 

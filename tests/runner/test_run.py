@@ -228,9 +228,9 @@ def test_a_run_that_is_broken_off_keeps_the_former_report(tmp_path, number):
 KILLED = """
 import multiprocessing, shutil, subprocess, sys, time
 from pathlib import Path
-from wildlab.runner.processes import notebook_process
-from wildlab.runner.processes.ending import start_process
-from wildlab.runner.processes.job import Job
+from wildlab.runner import notebook_process
+from wildlab.runner.processes import start_process
+from wildlab.runner.job import Job
 
 def body(pipe, job, begun):
     remove = shutil.rmtree

@@ -18,10 +18,9 @@ from wildlab.errors import RunFailed
 from wildlab.paths import NOTEBOOKS
 from wildlab.runner import open_study
 from wildlab.runner import seeds as fingerprint
+from wildlab.runner.job import Job
 from wildlab.runner.open_study import trials_table
-from wildlab.runner.processes.job import Job
-from wildlab.runner.processes.scheduling import _waiting
-from wildlab.runner.processes.worker_pool import answer
+from wildlab.runner.scheduling import _waiting
 from wildlab.runner.seeds import (
     SeedWork,
     make_work,
@@ -29,10 +28,10 @@ from wildlab.runner.seeds import (
     other_seeds,
     read_seed,
     seed_digest,
-    set_aside,
     sweep_seeds,
     write_seed,
 )
+from wildlab.runner.worker_pool import answer
 from wildlab.studies import protocol
 
 PARAMETERS = {"twin": "static-antenna", "not its own": 3}
@@ -160,7 +159,6 @@ def test_whatever_was_done_to_a_file_it_is_not_read(tmp_path, damage):
     assert text != path.read_text()
     path.write_text(text)
     assert read_seed(one, 1) is None and missing_seeds(one) == [1, 2, 3]
-    assert set_aside(one) == [1]
 
 
 def test_a_file_of_another_key_study_or_seed_is_not_read(tmp_path):
@@ -189,25 +187,22 @@ def test_a_digest_is_of_all_that_is_said_and_of_nothing_else(tmp_path):
     assert len({seed_digest(one, 1, VALUES), *others}) == 8
 
 
-def test_provenance_lists_digests_and_what_was_damaged(tmp_path):
+def test_provenance_lists_digests(tmp_path):
     one = kept_work(tmp_path)
     for seed in one.seeds:
         write_seed(one, seed, {"a/b": float(seed)})
     first = one.provenance()
     assert first["digests"] == {str(seed): seed_digest(one, seed, {"a/b": seed}) for seed in one.seeds}
-    assert first["damaged"] == {"count": 0, "seeds": []}
     write_seed(one, 2, {"a/b": 2.5})
     second = one.provenance()
     assert first["digest"] != second["digest"] and first["digests"]["1"] == second["digests"]["1"]
     (one.folder / "3.json").write_text("{")
-    assert set_aside(one) == [3] and set_aside(one) == [] and missing_seeds(one) == [3]
+    assert missing_seeds(one) == [3]
     write_seed(one, 3, {"a/b": 3.0})
-    sweep_seeds(one)
-    third = one.provenance()
-    assert third["damaged"] == {"count": 1, "seeds": [3]} and third["digest"] == second["digest"]
+    assert one.provenance()["digest"] == second["digest"]
 
 
-def test_a_run_computes_damaged_seeds_again_and_says_so(tmp_path):
+def test_a_run_computes_damaged_seeds_again(tmp_path):
     one = kept_work(tmp_path)
     for seed in (1, 2):
         write_seed(one, seed, VALUES)
@@ -215,7 +210,7 @@ def test_a_run_computes_damaged_seeds_again_and_says_so(tmp_path):
     waiting, told = _waiting(Job(one.study, "", "", "", "", seeds=one)), list[tuple[str, object]]()
     waiting.start(lambda name, event, what: told.append((event, what)))
     assert list(waiting.seeds) == [2, 3] and not waiting.ready
-    assert dict(told)["seeds"] == (2, 3) and str(dict(told)["again"]).endswith("1 seed (2)")
+    assert dict(told)["seeds"] == (2, 3)
 
 
 @pytest.mark.parametrize(

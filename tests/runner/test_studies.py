@@ -20,7 +20,7 @@ from wildlab.reporting.published import load_claims, load_published
 from wildlab.runner.catalogue import StudyEntry, load_studies
 from wildlab.runner.evaluate import evaluate_flight
 from wildlab.runner.run import run_studies
-from wildlab.sharing.document import read_part
+from wildlab.sharing.allow_list import read_part
 from wildlab.studies.navigation import TUNINGS
 from wildlab.studies.printed_numbers import all_pairs
 from wildlab.studies.protocol import run_trial, split_keys

@@ -13,7 +13,7 @@ from tests.analysis.robots import robot_flight
 from wildlab.flight.store import save_flight
 from wildlab.paths import REPORTS
 from wildlab.runner import evaluate, track
-from wildlab.runner.processes.job import Job, other_reports, typed, typed_in_report
+from wildlab.runner.job import Job, other_reports, typed, typed_in_report
 
 
 @given(st.lists(st.text(min_size=1).filter(lambda one: "\0" not in one)))

@@ -10,7 +10,7 @@ from wildlab.reporting import metrics
 from wildlab.reporting.published import ONE_FLIGHT, quantity_kind
 from wildlab.reporting.published_tables import CALCULATIONS, FITTED, PREDICTED, count_answers, group_of, tally
 from wildlab.runner.catalogue import load_studies
-from wildlab.runner.record.status import study_status
+from wildlab.runner.status import study_status
 
 SPREAD = {"low": 7.0, "high": 12.0, "flights": 100, "centre_low": 9.6, "centre_high": 10.0}
 

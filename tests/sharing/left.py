@@ -14,7 +14,7 @@ from wildlab.flight.manifest import manifest_toml
 from wildlab.flight.store import load_flight
 from wildlab.reporting.metrics import document
 from wildlab.reporting.text import escape, page
-from wildlab.runner.record.provenance import provenance_of_flight
+from wildlab.runner.provenance import provenance_of_flight
 
 _CODED = re.compile(r"sha256|fingerprint|epoch")
 

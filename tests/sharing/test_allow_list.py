@@ -20,8 +20,7 @@ from PIL import Image, PngImagePlugin
 from tests.sharing.spelt import CODED, DATES, LATITUDE, LEAKS, LONGITUDE, WHEN, secrets
 from wildlab.errors import RunFailed, WildlabError
 from wildlab.reporting.text import page
-from wildlab.sharing.allow_list import first_foreign_word
-from wildlab.sharing.document import read_part
+from wildlab.sharing.allow_list import first_foreign_word, read_part
 from wildlab.sharing.scan import SecretSearch
 
 

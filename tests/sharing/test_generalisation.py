@@ -24,13 +24,13 @@ from wildlab.geometry.camera import normalise
 from wildlab.geometry.gravity import local_earth
 from wildlab.navigation.strapdown import ImuSamples, integrate_strapdown
 from wildlab.sharing.generalisation import (
+    QUARTER,
     Generalised,
     first_stamp,
     generalise,
     new_origin,
     reach,
 )
-from wildlab.sharing.names import QUARTER
 from wildlab.sharing.tiers import treatment_of
 
 POSITION = ["north_m", "east_m", "down_m"]

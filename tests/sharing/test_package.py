@@ -20,9 +20,9 @@ from wildlab.errors import WildlabError
 from wildlab.files import write_json
 from wildlab.flight.store import save_flight
 from wildlab.reporting.text import page
-from wildlab.runner.record.digests import seal
+from wildlab.runner.status import seal
 from wildlab.runner.track import MANY_NOTEBOOK as NOTEBOOK
-from wildlab.sharing.document import Chapter, join_chapters, read_part
+from wildlab.sharing.allow_list import Chapter, join_chapters, read_part
 from wildlab.sharing.reports import sources_of
 from wildlab.sharing.share import (
     check_password,
@@ -64,6 +64,21 @@ def test_a_folder_to_work_in_is_private_and_gone_afterwards(tmp_path, monkeypatc
         (work / "page.html").write_text("half")
         raise KeyboardInterrupt
     assert not list(tmp_path.iterdir())
+
+
+def test_what_a_machine_left_when_it_stopped_goes_with_the_next_run(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    (tmp_path / "wildlab-share-before" / "reports").mkdir(parents=True)
+    (tmp_path / "wildlab-share-link").symlink_to(tmp_path)
+    with private_folder() as work, private_folder() as other:
+        assert work.is_dir() and other.is_dir() and not (tmp_path / "wildlab-share-before").exists()
+    assert [one.name for one in tmp_path.iterdir()] == ["wildlab-share-link"]
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / ".copy.html.x7").write_text("half of what is for the sender alone")
+    put(b"whole", out / "copy.html", overwrite=False, mode=0o600)
+    assert [one.name for one in out.iterdir()] == ["copy.html"]
+    assert (out / "copy.html").stat().st_mode & 0o077 == 0
 
 
 KILLED = """

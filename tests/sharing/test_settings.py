@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from wildlab.errors import WildlabError
 from wildlab.flight.files import dump_toml
 from wildlab.flight.manifest import parse_settings
-from wildlab.sharing.names import QUARTER, Names, neutral_settings, whole_quarters
+from wildlab.sharing.generalisation import QUARTER, Names, neutral_settings, whole_quarters
 
 TOLD = """
 [sensors."Letaba mast"]

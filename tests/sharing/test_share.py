@@ -30,7 +30,7 @@ from wildlab.reporting.metrics import AGAINST, metric
 from wildlab.reporting.published_tables import strip
 from wildlab.reporting.status import Number
 from wildlab.reporting.text import escape, page
-from wildlab.runner.processes.scheduling import Outcome
+from wildlab.runner.scheduling import Outcome
 from wildlab.sharing import recomputation as redrawn
 from wildlab.sharing.recomputation import share_apart
 from wildlab.sharing.reports import of_a_study

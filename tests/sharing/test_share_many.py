@@ -9,6 +9,7 @@ import base64
 import re
 import shutil
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote_to_bytes
@@ -23,11 +24,10 @@ from wildlab.errors import RunFailed
 from wildlab.flight.manifest import read_settings
 from wildlab.flight.store import Flight, load_flight, save_flight
 from wildlab.reporting.metrics import metric
-from wildlab.runner.processes.scheduling import Outcome
+from wildlab.runner.scheduling import Outcome
 from wildlab.runner.track import MANY_NOTEBOOK as NOTEBOOK
 from wildlab.runner.track import track_many
-from wildlab.sharing import generalisation as generalise
-from wildlab.sharing import names as neutral
+from wildlab.sharing import generalisation as neutral
 from wildlab.sharing import recomputation as redrawn
 from wildlab.sharing.share import share
 
@@ -141,12 +141,10 @@ def test_a_report_on_many_targets_is_a_part_and_tells_nothing(made):
     assert "'Pafuri post'" in lines and "'Thandis mokoro'" in lines
 
 
-def hulls_left(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(neutral, "neutral_hulls", lambda _: None)
-
-
-def hulls_of_the_flight_left(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(generalise, "neutral_hulls", lambda _: None)
+def hulls_left(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of the settings, or of the flight, whichever has the name."""
+    clean = neutral.neutral_hulls
+    monkeypatch.setattr(neutral, "neutral_hulls", lambda one: None if name in str(one) else clean(one))
 
 
 def settings_left(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -164,7 +162,11 @@ def settings_left(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize(
     ("broken", "found"),
-    [(hulls_left, "Shingwedzi"), (hulls_of_the_flight_left, "thandis"), (settings_left, "Pafuri")],
+    [
+        (partial(hulls_left, "Shingwedzi"), "Shingwedzi"),
+        (partial(hulls_left, "andi"), "thandis"),
+        (settings_left, "Pafuri"),
+    ],
 )
 def test_a_name_that_is_left_in_is_found_and_there_is_no_copy(
     broken,

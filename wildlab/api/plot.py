@@ -15,7 +15,7 @@ from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.flight.store import Flight
 from wildlab.names import figure_name
-from wildlab.reporting.charts.navigation import error_bands
+from wildlab.reporting.charts.flights import error_bands
 from wildlab.reporting.charts.tracks import track_map
 from wildlab.reporting.figures import (
     BLUE,

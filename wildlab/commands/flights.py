@@ -198,8 +198,7 @@ def click_(flight: Path, images: Path | None, port: int, take: bool) -> None:
         _take(flight)
         return
     from wildlab.flight.manifest import FILE_NAME
-    from wildlab.runner.annotation.server import open_server
-    from wildlab.runner.annotation.session import open_session
+    from wildlab.runner.annotation import open_server, open_session
 
     session = open_session(flight, images)
     server = open_server(session, port)
@@ -224,7 +223,7 @@ def click_(flight: Path, images: Path | None, port: int, take: bool) -> None:
 
 def _take(flight: Path) -> None:
     from wildlab.flight.files import printable
-    from wildlab.runner.annotation.session import take_clicks
+    from wildlab.runner.annotation import take_clicks
 
     taken = take_clicks(flight)
     said = f"{count(taken.points, 'point')} in {count(taken.frames, 'frame')} taken as detections"

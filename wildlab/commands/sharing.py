@@ -13,7 +13,7 @@ import click
 from wildlab.commands import shared
 from wildlab.commands.shared import ANY, FILE, FOLDER, terminal_console
 from wildlab.errors import WildlabError
-from wildlab.runner.processes.ending import start_server
+from wildlab.runner.processes import start_server
 from wildlab.terminal import count, print_json, sentence, shown
 
 #: Where a password may stand that nobody types: never on the command line, which others can see.
@@ -123,7 +123,7 @@ def verify(report: Path, flight: Path | None, raw: Path | None, as_json: bool) -
       wildlab verify reports/tuesday-overview
       wildlab verify reports/tuesday-overview --raw card/DCIM
     """
-    from wildlab.runner.verification import verify_report
+    from wildlab.runner.provenance import verify_report
 
     found = verify_report(report, flight, raw)
     if as_json:

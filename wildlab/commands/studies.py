@@ -10,7 +10,7 @@ import click
 
 from wildlab.commands import shared
 from wildlab.commands.shared import FOLDER, terminal_console
-from wildlab.runner.processes.ending import start_server
+from wildlab.runner.processes import start_server
 from wildlab.terminal import count, print_json, print_table, shown
 
 jobs = click.option("--jobs", type=click.IntRange(1), default=1, show_default=True, help="Processes.")
@@ -33,7 +33,7 @@ def list_(reports: Path, as_json: bool, rule: bool) -> None:
     from wildlab.flight.catalog import is_fetched
     from wildlab.reporting.published_tables import tally
     from wildlab.runner.catalogue import load_studies
-    from wildlab.runner.record.status import as_plain, study_status
+    from wildlab.runner.status import as_plain, study_status
 
     if rule:
         from wildlab.evaluation.replication import operating_characteristics

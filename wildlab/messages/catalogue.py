@@ -48,6 +48,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from datetime import date
 from functools import lru_cache
+from numbers import Integral
 from pathlib import Path
 from typing import Any, NamedTuple, Union
 
@@ -108,7 +109,7 @@ class Message(NamedTuple):
     """
 
     key: str
-    values: Mapping[str, Value] = {}
+    values: Mapping[str, Any] = {}
     n: float | None = None
 
 
@@ -458,7 +459,7 @@ def fill(
         if subject is not None:
             return FORMS[form or "value"](recorded[name, subject])
         value = values[name]
-        if isinstance(value, str | int):
+        if isinstance(value, str | Integral):
             return str(value)
         if isinstance(value, float):
             return percent_of(value) if form == "percent" else significant(value)

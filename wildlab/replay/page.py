@@ -38,6 +38,8 @@ from wildlab.reporting.text import TEMPLATES, render
 
 #: Rows of points and of a way, and detections in images, at most.
 MOST_ROWS, MOST_SEEN = 3000, 10_000
+#: By what tracks can be chosen; of more than so many, those of one filter are shown at first.
+_CHOICES, MOST_AT_ONCE = ("target", "filter"), 6
 #: What the browser may do: run the script with this hash, and show what is in the file.
 POLICY = (
     "default-src 'none'; script-src 'sha256-{script}'; style-src 'sha256-{style}'; img-src data:; "
@@ -61,7 +63,8 @@ def page(scene: ReplayScene, shots: Mapping[int, bytes]) -> str:
     """
     script, style = ((TEMPLATES / name).read_text(encoding="utf-8") for name in ("replay.js", "replay.css"))
     # No text ends the element that it stands in.
-    data = json.dumps(drawn(scene, shots), separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    found = drawn(scene, shots)
+    data = json.dumps(found, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     return (
         render(
             "replay",
@@ -70,7 +73,9 @@ def page(scene: ReplayScene, shots: Mapping[int, bytes]) -> str:
             kind="A simulated flight" if scene.kind == "twin" else "A recorded flight",
             lasts=minutes(scene.length) if scene.timed else "",
             images=len(scene.views.times) if scene.views is not None else 0,
-            filters=_filters(scene),
+            filters={one["filter"]: one["colour"] for one in found["tracks"]},
+            choices={key: list(dict.fromkeys(one[key] for one in found["tracks"])) for key in _CHOICES},
+            preset="filter" if len(scene.tracks) > MOST_AT_ONCE else "",
             points=scene.points is not None,
             truth=bool(scene.truth),
             path=scene.path is not None,
@@ -90,11 +95,6 @@ def _thinned(scene: ReplayScene) -> list[str]:
 
 def _hash(text: str) -> str:
     return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
-
-
-def _filters(scene: ReplayScene) -> dict[str, str]:
-    """The colour of each filter by its name."""
-    return {filter_words(plain(one.filter)): colour(one.filter) for one in scene.tracks}
 
 
 def drawn(scene: ReplayScene, shots: Mapping[int, bytes]) -> dict[str, Any]:
@@ -146,7 +146,8 @@ def drawn(scene: ReplayScene, shots: Mapping[int, bytes]) -> dict[str, Any]:
         found["points"] = _judged(scene.points, MOST_ROWS)
     for one in scene.tracks:
         rows = _judged(one, 2 * MOST_ROWS // len(scene.tracks))
-        found["tracks"].append({"colour": colour(one.filter), **rows})
+        named = {"target": plain(one.target), "filter": filter_words(plain(one.filter))}
+        found["tracks"].append({"colour": colour(one.filter), **named, **rows})
     if scene.terrain is not None:
         found["ground"] = _ground(scene)
     return found

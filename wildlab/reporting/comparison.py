@@ -16,9 +16,8 @@ from wildlab.names import listed
 from wildlab.paths import DATA
 from wildlab.reporting.charts.drawing import DASHED, Values, rows_chart
 from wildlab.reporting.figures import GREY
-from wildlab.reporting.layout import LIMITS
-from wildlab.reporting.notebook_pages import finished_page
-from wildlab.reporting.own_flights import OwnFlight, pill_of
+from wildlab.reporting.front_page import OwnFlight, pill_of
+from wildlab.reporting.notebook_pages import LIMITS, finished_page
 from wildlab.reporting.report import Wording, open_report
 from wildlab.reporting.text import TAGS, csv_link
 
@@ -172,7 +171,9 @@ def comparison_page(flights: Sequence[OwnFlight]) -> str:
     wording = Wording(report, load_texts("comparison"), {"n": len(flights)})
     texts, title = wording.texts.subjects, wording.say(wording.texts.subjects["title"])
     report.head(title, ", ".join(flight.name for flight in flights))
-    report.summary(wording.messages([_counted(flights)]), **_worst(flights, wording))
+    words = [pill_of(flight)[0] for flight in flights]
+    counts = "; ".join(f"{words.count(word)} {word}" for word in dict.fromkeys(words))
+    report.summary(wording.messages([Message("counted", {"counts": counts})]), **_worst(flights, wording))
     side = wording.texts.tables["flights"]
     report.section(side.title)
     names = {f"flight{k}": flight.name for k, flight in enumerate(flights)}
@@ -207,12 +208,6 @@ def _worst(flights: Sequence[OwnFlight], wording: Wording) -> dict[str, Any]:
         "verdict": (word.value, *wording.messages([Message("worst", {"flights": whose})])),
         "level": word.colour,
     }
-
-
-def _counted(flights: Sequence[OwnFlight]) -> Message:
-    words = [pill_of(flight)[0] for flight in flights]
-    counts = "; ".join(f"{words.count(word)} {word}" for word in dict.fromkeys(words))
-    return Message("counted", {"counts": counts})
 
 
 def _aligned(flights: Sequence[OwnFlight], texts: Mapping[str, str]) -> pd.DataFrame:
@@ -257,8 +252,8 @@ def _figure(
     title = f"{quantity.label[:1].upper()}{quantity.label[1:]}"
     values = {
         "what": f"{title}{unit}",
-        "n": str(len(found)),
-        "all": str(len(flights)),
+        "n": len(found),
+        "all": len(flights),
         "value": number(value[least]),
         "first": found[least][0],
         "least": number(value[least]),

@@ -17,8 +17,7 @@ from wildlab.messages.catalogue import Message, load_texts, words
 from wildlab.messages.quantities import NOTHING, percent_of
 from wildlab.names import figure_name
 from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, new_figure
-from wildlab.reporting.layout import ADVICE
-from wildlab.reporting.notebook_pages import finished_page
+from wildlab.reporting.notebook_pages import ADVICE, finished_page
 from wildlab.reporting.report import Wording, open_report
 
 #: Bytes of pictures on a page at most: it is sent by mail. What has no room is left out, and that is said.
@@ -54,13 +53,13 @@ def answer(result: Mapping[str, Any]) -> list[Message]:
         return [Message("no-image")]
     rows = rates_shown(result)
     if not rows:
-        return [Message("not-judged", {"detections": str(result["detections"])})]
+        return [Message("not-judged", {"detections": result["detections"]})]
     where, best = next(iter(rows.items()))
     values = {
-        "found": str(best["found"]),
-        "labelled": str(best["found"] + best["missed"]),
-        "invented": str(best["invented"]),
-        "detections": str(best["found"] + best["invented"]),
+        "found": best["found"],
+        "labelled": best["found"] + best["missed"],
+        "invented": best["invented"],
+        "detections": best["found"] + best["invented"],
     }
     said = [Message("held-out" if where == "held-out" else "labels", values)]
     share = (result.get("judged") or {}).get("ellipse_coverage_90")
@@ -76,7 +75,7 @@ def reason(result: Mapping[str, Any]) -> tuple[str, str, Message]:
     """Level, key of the verdict's word, and why."""
     of, judged = result["frames"], result.get("judged")
     if lost := of["all"] - of["usable"]:
-        return "warn", "lost", Message("reason-lost", {"lost": str(lost), "all": str(of["all"])})
+        return "warn", "lost", Message("reason-lost", {"lost": lost, "all": of["all"]})
     key = "judged" if judged else "not-judged"
     return "neutral", key, Message(f"reason-{key}")
 
@@ -97,9 +96,9 @@ def advice(result: Mapping[str, Any]) -> list[Message]:
     said = []
     missed, invented = int(judged["missed"]), int(judged["invented"])
     if missed + invented and result.get("fit") is None:
-        said.append(Message("advice-fit", {"missed": str(missed), "invented": str(invented)}))
+        said.append(Message("advice-fit", {"missed": missed, "invented": invented}))
     if judged["f1"]["estimate"] is not None and judged["f1"]["low"] is None:
-        said.append(Message("advice-few", {"groups": str(judged["groups"])}))
+        said.append(Message("advice-few", {"groups": judged["groups"]}))
     return said
 
 
@@ -204,9 +203,7 @@ def detections_page(
     report = open_report(study="detections", kind="images")
     wording = Wording(report, load_texts("detections"))
     names, of = wording.texts.subjects, result["frames"]
-    title = wording.say(
-        names["title"], {"detections": str(result["detections"]), "images": str(of["usable"])}
-    )
+    title = wording.say(names["title"], {"detections": result["detections"], "images": of["usable"]})
     report.head(title, f"{name}, method {result['method']}")
     level, key, why = reason(result)
     verdict = (names[f"verdict-{key}"], wording.messages([why])[0])
@@ -263,7 +260,7 @@ def _show_sheets(wording: Wording, result: Mapping[str, Any], sheets: Mapping[st
         total = int(judged[key]) if judged else int(result["detections"])
         left -= len(sheets[key])
         wording.report.section(f"{names[f'sheet-{key}']}: {total}")
-        caption = wording.say(names[f"sheet-caption-{key}"], {"number": str(number), "total": str(total)})
+        caption = wording.say(names[f"sheet-caption-{key}"], {"number": number, "total": total})
         wording.report.picture(sheets[key], alt=names[f"sheet-{key}"], caption=caption, wide=True)
     return left
 
@@ -283,7 +280,7 @@ def _show_overlays(
     key = names["colours-judged" if judged else "colours"]
     left_out = len(overlays) - len(shown)
     report.section(
-        names["images"], key + (wording.say(names["more"], {"more": str(left_out)}) if left_out else "")
+        names["images"], key + (wording.say(names["more"], {"more": left_out}) if left_out else "")
     )
     for frame, data in shown:
         report.picture(data, alt=f"{frame}: {key}", caption=frame)
@@ -293,7 +290,7 @@ def _show_details(wording: Wording, result: Mapping[str, Any], thresholds: Mappi
     names, report, judged = wording.texts.subjects, wording.report, result.get("judged")
     said = words("terminal", result.get("notes", ()))
     if judged and (aside := result["detections"] - judged["found"] - judged["invented"]) > 0:
-        said += wording.messages([Message("aside", {"aside": str(aside), "of": str(result["detections"])})])
+        said += wording.messages([Message("aside", {"aside": aside, "of": result["detections"]})])
     part = thresholds.get("part")
     if isinstance(part, float) and part > 0:
         said += wording.messages([Message("part", {"part": f"{100 * part:.0f}"})])
@@ -303,9 +300,7 @@ def _show_details(wording: Wording, result: Mapping[str, Any], thresholds: Mappi
         report.section(f"{names['problems']}: {len(problems)}")
         more = len(problems) - LISTED
         listed = [f"{image}: {why}" for image, why in problems[:LISTED]]
-        report.points(
-            [*listed, *([wording.say(names["more-problems"], {"more": str(more)})] if more > 0 else [])]
-        )
+        report.points([*listed, *([wording.say(names["more-problems"], {"more": more})] if more > 0 else [])])
     rows = [
         {"threshold": key, "value": str(value)}
         for key, value in thresholds.items()

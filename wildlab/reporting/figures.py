@@ -21,7 +21,6 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -90,13 +89,9 @@ def least_size(figure: Figure) -> float:
     float
         `LEAST_SIZE` where it has no text.
     """
-    sizes = [float(text.get_fontsize()) for text in figure.findobj(Text) if _is_seen(text)]
+    texts = (one for one in figure.findobj(Text) if isinstance(one, Text) and one.get_visible())
+    sizes = [float(text.get_fontsize()) for text in texts if text.get_text().strip()]
     return 72.0 * LEAST_TEXT / min(sizes) if sizes else float(LEAST_SIZE)
-
-
-def _is_seen(artist: Artist) -> bool:
-    """Whether a text is on the figure: it says something, and neither it nor what holds it is hidden."""
-    return isinstance(artist, Text) and bool(artist.get_text().strip()) and artist.get_visible()
 
 
 def fit_text(figure: Figure) -> None:
@@ -318,12 +313,6 @@ def house_rc() -> mpl.RcParams:
     return mpl.rc_params_from_file(STYLE_FILE, use_default_template=False)
 
 
-def house_style() -> None:
-    """Set matplotlib's defaults to ours, whatever the reader's own settings file says."""
-    mpl.rcdefaults()
-    mpl.rcParams.update(house_rc())
-
-
 def new_figure(
     width: float = 5.6, height: float = 3.6, *, rows: int = 1, columns: int = 1, **subplots: Any
 ) -> tuple[Figure, Any]:
@@ -352,7 +341,9 @@ def new_figure(
     >>> axes.shape
     (2,)
     """
-    house_style()
+    # Whatever the reader's own settings file says.
+    mpl.rcdefaults()
+    mpl.rcParams.update(house_rc())
     figure = Figure(figsize=(WIDTH * width, HEIGHT * height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure, figure.subplots(rows, columns, **subplots)

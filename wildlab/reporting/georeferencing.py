@@ -34,7 +34,7 @@ from wildlab.flight.store import Flight
 from wildlab.messages.catalogue import Message, PageTexts, load_texts, words
 from wildlab.messages.quantities import measure, percent_of, significant
 from wildlab.names import listed
-from wildlab.reporting.charts.tracks import error_scatter, error_shares, errors_by_image
+from wildlab.reporting.charts.tracks import error_map, error_scatter, error_shares, errors_by_image
 from wildlab.reporting.figures import colour
 from wildlab.reporting.georeferencing_tables import (
     SUMMARY,
@@ -48,8 +48,9 @@ from wildlab.reporting.georeferencing_tables import (
     parameters_table,
     parts_table,
     simplest_rivals,
+    worst_images,
 )
-from wildlab.reporting.layout import ADVICE
+from wildlab.reporting.notebook_pages import ADVICE
 from wildlab.reporting.published import load_published
 from wildlab.reporting.report import Report, Wording
 
@@ -100,7 +101,8 @@ def record_accuracy(
     record_errors(report, "logged-pose", found.scored, found.intervals)
     diagnosis = found.diagnosis
     if diagnosis is not None:
-        _record_gain(report, "winner", diagnosis.winner.gain.gain, int(diagnosis.inliers.sum()))
+        gain, n = diagnosis.winner.gain.gain, int(diagnosis.inliers.sum())
+        report.metric("gain", "winner", gain.estimate, "m", n=n, low=gain.low, high=gain.high)
         if diagnosis.counts:
             record_summary(report, "calibrated-pose", diagnosis.held_summary())
     if diagnosis and diagnosis.outliers and diagnosis.inliers.any():
@@ -114,10 +116,6 @@ def record_accuracy(
         subject = "recorded-answers" if len(answers) == 1 else f"recorded-answers/{program}"
         others[program] = record_errors(report, subject, table)
     return others
-
-
-def _record_gain(report: Report, subject: str, gain: Any, n: int) -> None:
-    report.metric("gain", subject, gain.estimate, "m", n=n, low=gain.low, high=gain.high)
 
 
 def named(tables: Mapping[str, pd.DataFrame], kind: str, *, shown: bool) -> dict[str, pd.DataFrame]:
@@ -216,7 +214,7 @@ def cause_message(diagnosis: Diagnosis | None) -> Message:
         return Message("cause-untried")
     if diagnosis.too_many_out:
         out = int((~diagnosis.inliers).sum())
-        return Message("cause-outliers", {"out": str(out), "points": str(len(diagnosis.inliers))})
+        return Message("cause-outliers", {"out": out, "points": len(diagnosis.inliers)})
     winner = diagnosis.winner
     share = gained_share(winner.gain)
     if not winner.causes or (not diagnosis.counts and share < WORTH):
@@ -244,9 +242,9 @@ def answer(found: Accuracy) -> list[Message]:
     """How far off positions are, and why: the two sentences that answer the page's question."""
     summary, total = found.summary, len(found.scored)
     values = {
-        "points": str(summary.n),
-        "total": str(total),
-        "lost": str(found.lost),
+        "points": summary.n,
+        "total": total,
+        "lost": found.lost,
         "median": short_length(summary.median),
         "p90": short_length(summary.p90),
     }
@@ -308,15 +306,15 @@ def verdict_of_accuracy(
     verdict, total = verdict_of(evidence), logged.n + lost
     gain = gained_share(diagnosis.winner.gain) if diagnosis is not None and diagnosis.counts else 0.0
     times = 1 / ellipses.factor.estimate if ellipses.factor.estimate > 0 else np.nan
-    reasons: tuple[tuple[str, bool, dict[str, str]], ...] = (
-        ("reason-contradictions", problems > 0, {"problems": str(problems)}),
-        ("reason-lost", lost > MANY_LOST * total or not logged.n, {"lost": str(lost), "total": str(total)}),
+    reasons: tuple[tuple[str, bool, dict[str, Any]], ...] = (
+        ("reason-contradictions", problems > 0, {"problems": problems}),
+        ("reason-lost", lost > MANY_LOST * total or not logged.n, {"lost": lost, "total": total}),
         ("reason-gain", gain >= WORTH, {"share": percent_of(gain)}),
-        ("reason-outliers", evidence.troubled > 0, {"outliers": str(evidence.troubled)}),
+        ("reason-outliers", evidence.troubled > 0, {"outliers": evidence.troubled}),
         ("reason-possible", evidence.possible > 0, {"share": percent_of(evidence.possible)}),
         ("reason-ellipses", ellipses.word == "too small", {}),
         ("reason-ellipses-long", is_conservative(ellipses.factor), {"times": significant(times)}),
-        ("reason-few", logged.n < FEW, {"points": str(logged.n)}),
+        ("reason-few", logged.n < FEW, {"points": logged.n}),
         ("reason-untried", diagnosis is None, {}),
         ("reason-sound", True, {}),
     )
@@ -362,11 +360,11 @@ def limits(
     offset = manifest.clocks.camera_offset_s
     rest = offset - ZONE_S * round(offset / ZONE_S)
     timed = manifest.time.kind == "utc" and "frame_id" not in flight.pose_source(source)[1]
-    conditional: tuple[tuple[str, bool, dict[str, str]], ...] = (
+    conditional: tuple[tuple[str, bool, dict[str, Any]], ...] = (
         ("limit-heading", one_heading_hides(found), {}),
         ("limit-misfit", diagnosis is not None and diagnosis.misfit, {}),
         ("limit-extended", diagnosis is not None and diagnosis.extended, {}),
-        ("limit-lost", 0 < found.lost <= MANY_LOST * len(found.scored), {"lost": str(found.lost)}),
+        ("limit-lost", 0 < found.lost <= MANY_LOST * len(found.scored), {"lost": found.lost}),
         ("limit-clock-fitted", manifest.kind != "twin" and abs(rest) > 1e-6, {"offset": f"{rest:+.2f}"}),
         ("limit-halves", bool(found.halves.disagree), {}),
         ("limit-nearest", found.visible_m == found.visible_m, {"hidden": short_length(found.visible_m)}),
@@ -474,6 +472,10 @@ def show_accuracy(
     if logged.n:
         report.tiles(_tiles(found, texts))
         _figures(report, wording, found, programs)
+        report.section(texts.subjects["where"])
+        worst = worst_images(found.scored)
+        wording.figure("error-map", error_map(found.scored, list(worst["image"])))
+        wording.table("worst", worst)
         rows = {texts.subjects["applied" if applied else "logged"]: logged}
         rows |= _other_summaries(found, texts)
         rows |= {texts.subjects["recorded"].format(program): one for program, one in others.items()}
@@ -566,7 +568,7 @@ def _ellipse_message(verdict: EllipseVerdict) -> Message:
     factor = verdict.factor
     values = {
         "inside": percent_of(verdict.coverage.estimate),
-        "n": str(verdict.n),
+        "n": verdict.n,
         "factor": significant(factor.estimate),
         "low": significant(factor.low),
         "high": significant(factor.high),
@@ -599,15 +601,15 @@ MOST_THINGS = 20
 def answer_repeats(found: Repeats) -> Message:
     """How far apart sightings lie, and whether the ellipses fit that."""
     spread, total = found.spread, len(found.points)
-    values = {"lost": str(found.lost), "total": str(total)}
+    values: dict[str, Any] = {"lost": found.lost, "total": total}
     if found.lost > MANY_LOST * total:
         return Message("many-lost", values)
     if spread is None:
         return Message("none-twice", values)
     values |= {
         "scatter": short_length(spread.sd),
-        "sightings": str(spread.sightings),
-        "things": str(spread.things),
+        "sightings": spread.sightings,
+        "things": spread.things,
         "ratio": significant(spread.consistent),
     }
     if math.isnan(spread.consistent) or spread.sightings < FEW_POINTS:
@@ -622,9 +624,9 @@ def verdict_of_repeats(found: Repeats, problems: int = 0) -> tuple[Verdict, Mess
     total = len(found.points)
     word = verdict_of(Evidence(problems=problems, lost=found.lost / total if total else math.nan))
     if problems:
-        return word, Message("reason-contradictions", {"problems": str(problems)})
+        return word, Message("reason-contradictions", {"problems": problems})
     if word == Verdict.MEND:
-        return word, Message("reason-lost", {"lost": str(found.lost), "total": str(total)})
+        return word, Message("reason-lost", {"lost": found.lost, "total": total})
     return word, Message("reason-unknown")
 
 

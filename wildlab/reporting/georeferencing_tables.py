@@ -17,8 +17,8 @@ from wildlab.geometry.calibration import BORESIGHT, Calibration
 from wildlab.messages.catalogue import load_texts
 from wildlab.reporting.report import Report
 
-#: Rows of the table of models.
-SHOWN = 8
+#: Rows of the table of models, and of that of the worst images.
+SHOWN, MOST_IMAGES = 8, 10
 _NOISE = {
     "position_horizontal": ("position_horizontal_m", "m"),
     "position_vertical": ("position_vertical_m", "m"),
@@ -57,6 +57,13 @@ def groups_table(groups: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
             for name, rows in groups.items()
         ]
     )
+
+
+def worst_images(scored: pd.DataFrame) -> pd.DataFrame:
+    """The images with the largest mean error, `MOST_IMAGES` at most, numbered as on the map."""
+    each = scored.dropna(subset=["error_m"]).groupby("frame_id", sort=False)["error_m"]
+    found = each.agg(["count", "mean", "max"]).nlargest(MOST_IMAGES, "mean").reset_index(names="image")
+    return found.assign(number=np.arange(len(found)) + 1)
 
 
 def beside_published(published: pd.DataFrame, theirs: ErrorSummary, ours: ErrorSummary) -> pd.DataFrame:

@@ -7,6 +7,7 @@ What the page says follows by rules from what was tracked and how it compares wi
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -18,7 +19,7 @@ from wildlab.evaluation.identities import Gospa, Identities
 from wildlab.messages.catalogue import Message, load_texts
 from wildlab.messages.quantities import length, percent_of
 from wildlab.names import listed
-from wildlab.reporting.charts import following as charts
+from wildlab.reporting.charts import tracks as charts
 from wildlab.reporting.report import Report, Wording
 from wildlab.reporting.tracking import count_assumed, parameters_table, plain
 from wildlab.tracking.many.tracks import Count, count_interval, count_probabilities
@@ -67,11 +68,6 @@ def false_share(lives: Identities) -> float:
     return float(np.mean([one.n_false > 0 for one in lives.gospa]))
 
 
-def judged_nees(lives: Identities) -> list[float]:
-    """Mean NEES / 2 of the tracks that have enough of them to be judged."""
-    return [one.anees / 2 for one in lives.tracks.values() if one.compared >= FEWEST]
-
-
 def counted(count: Count) -> str:
     """An interval of a number of targets.
 
@@ -113,7 +109,7 @@ VERDICTS = {
 def answer(followed: ManyTracks, lives: Identities | None) -> list[Message]:
     """How well the targets are tracked, and what goes wrong: two sentences at most."""
     tracks, _ = counts_of(followed)
-    values = {"tracks": str(tracks), "scans": str(len(followed.scans)), "minutes": f"{followed.minutes:.1f}"}
+    values = {"tracks": tracks, "scans": len(followed.scans), "minutes": f"{followed.minutes:.1f}"}
     if not tracks:
         return [Message("no-track", values)]
     if lives is None:
@@ -124,21 +120,21 @@ def answer(followed: ManyTracks, lives: Identities | None) -> list[Message]:
     never = sum(share == 0 for share in seen.values())
     least = min(seen, key=lambda name: seen[name])
     values = {
-        "targets": str(len(seen)),
+        "targets": len(seen),
         "share": percent_of(seen[least]),
         "target": plain(str(least)),
         "rmse": length(rms_error(lives)) if on_target(lives) else "–",
-        "never": str(never),
+        "never": never,
     }
     key = "never-any" if never == len(seen) else "never" if never else "one" if len(seen) == 1 else "several"
     first = Message(key, values)
     if reach := needed_reach(followed):
         return [first, Message("reach", {"cutoff": f"{followed.cutoff_m:g}", "reach": f"{reach:.0f}"})]
     counts = {
-        "swaps": str(lives.swaps),
-        "breaks": str(lives.breaks),
-        "false": str(sum(track.false for track in lives.tracks.values())),
-        "tracks": str(len(lives.tracks)),
+        "swaps": lives.swaps,
+        "breaks": lives.breaks,
+        "false": sum(track.false for track in lives.tracks.values()),
+        "tracks": len(lives.tracks),
     }
     return [first, Message("identities-others" if followed.others else "identities", counts)]
 
@@ -156,7 +152,8 @@ def reason(followed: ManyTracks, lives: Identities | None) -> Message:
     seen = [] if lives is None else [life for life in lives.targets.values() if life.visible]
     if lives is None or not seen:
         return Message("reason-unjudged")
-    nees = judged_nees(lives)
+    # Of the tracks that have enough of them to be judged.
+    nees = [one.anees / 2 for one in lives.tracks.values() if one.compared >= FEWEST]
     false = sum(track.false for track in lives.tracks.values())
     counts = (
         ("swaps", lives.swaps, len(lives.tracks)),
@@ -171,9 +168,7 @@ def reason(followed: ManyTracks, lives: Identities | None) -> Message:
         ("conservative", sum(value < SMALLEST for value in nees), len(nees)),
     )
     key, count, of = next((one for one in counts if one[1]), ("sound", 0, 0))
-    return Message(
-        f"reason-{key}", {"count": str(count), "of": str(of), "share": percent_of(false_share(lives))}
-    )
+    return Message(f"reason-{key}", {"count": count, "of": of, "share": percent_of(false_share(lives))})
 
 
 def limits(followed: ManyTracks) -> list[Message]:
@@ -188,11 +183,11 @@ def limits(followed: ManyTracks) -> list[Message]:
     estimated = [followed.truth_sd[name] for name in followed.truth_estimated if name in followed.truth_sd]
     exact = len(followed.truth) - sum(sd > 0 for sd in followed.truth_sd.values())
     truth = bool(followed.truth)
-    conditional: tuple[tuple[str, bool, dict[str, str]], ...] = (
+    conditional: tuple[tuple[str, bool, dict[str, Any]], ...] = (
         ("others", truth and not followed.others, {}),
         ("beside", truth and followed.others, {}),
         ("truth-estimated", bool(estimated), {"sd": f"{max(estimated, default=0.0):.2g}"}),
-        ("truth-exact", truth and exact > 0, {"count": str(exact)}),
+        ("truth-exact", truth and exact > 0, {"count": exact}),
         ("shared", bool(shared), {"sensors": listed(shared)}),
         ("bare", bool(bare), {"sensors": listed(bare)}),
         (
@@ -330,10 +325,6 @@ def show_many(report: Report, followed: ManyTracks, lives: Identities | None) ->
         wording.table("parts", parts_table(lives.gospa), apart)
     report.limits(wording.messages(limits(followed)))
     report.section("Details")
-    table = tracks_table(followed, lives)
-    if len(table):
-        text = wording.texts.tables["tracks"]
-        columns = {name: heading for name, heading in text.columns.items() if name in table}
-        report.table(table, columns=columns, digits=text.digits, caption=text.caption, fold=text.title)
+    wording.table("tracks", tracks_table(followed, lives))
     wording.table("parameters", parameters_table(followed.given), count_assumed(followed.given))
     report.method(wording.texts.method)

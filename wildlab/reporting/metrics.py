@@ -3,7 +3,7 @@
 ::
 
     {"study", "flight", "kind": "logged"|"twin"|"computed", "seed", "seeds",
-     "metrics": [{"name", "subject", "value", "unit", "n", "published", "source", "low", "high", "below",
+     "metrics": [{"name", "subject", "value", "unit", "n", "published", "source", "low", "high",
                  "flights", "centre_low", "centre_high", "power"}],
      "claims":  [{"id", "text", "verdict", "fraction", "seeds", "low", "high", "met", "half", "twice",
                   "difference", "difference_low", "difference_high"}]}
@@ -11,12 +11,12 @@
 A value that could not be computed is ``null``. ``low`` and ``high`` bound the spread over ``seeds`` flights
 (or over ``n`` runs of one): the 90 % prediction interval of one more, from 19 on, the lowest and the
 highest of fewer, ``null`` for one. Of a calculation they bound what rounded inputs leave open; where there
-are no flights to go over, the middle 90 % of draws with replacement. ``below`` is the share of the flights
-that lie below the published number, ``flights`` how many have a value, ``centre_low`` and ``centre_high``
-the 90 % confidence interval of their median, and ``power`` the probability that a published flight with
-errors half as large would lie outside (`wildlab.evaluation.replication`). Of a claim, ``fraction`` is the
-share of the ``met`` flights that meet its premise, ``low`` and ``high`` its 95 % interval; ``half`` and
-``twice`` the verdicts at other thresholds; ``difference`` the paired mean difference with its interval.
+are no flights to go over, the middle 90 % of draws with replacement. ``flights`` is how many have a value,
+``centre_low`` and ``centre_high`` the 90 % confidence interval of their median, and ``power`` the probability
+that a published flight with errors half as large would lie outside (`wildlab.evaluation.replication`). Of a
+claim, ``fraction`` is the share of the ``met`` flights that meet its premise, ``low`` and ``high`` its 95 %
+interval; ``half`` and ``twice`` the verdicts at other thresholds; ``difference`` the paired mean difference
+with its interval.
 ``seeds`` is how many flights the numbers come from; ``first_look`` in ``status.json`` beside it says where
 those are fewer than the study's own.
 """
@@ -72,10 +72,11 @@ _METRIC: dict[str, type] = {
     "n": int,
     "published": float,
     "source": str,
-    **dict.fromkeys(("low", "high", "below"), float),
+    **dict.fromkeys(("low", "high"), float),
     "flights": int,
     **dict.fromkeys(("centre_low", "centre_high", "power"), float),
 }
+_GONE = frozenset({"below"})
 _CLAIM: dict[str, type] = {
     "fraction": float,
     "seeds": int,
@@ -114,8 +115,8 @@ def metric(name: str, subject: str, value: Any, unit: str, **more: Any) -> dict[
         ``"m"``, ``"deg"``; ``"1"`` for a number without.
     **more
         ``n``: how many values it is from. ``published`` and ``source``: the printed number, and where it is
-        printed. ``low`` and ``high``: bounds of the value. ``below``: share of the flights that lie below the
-        printed number. ``flights``: how many of them have a value. ``centre_low`` and ``centre_high``: 90 %
+        printed. ``low`` and ``high``: bounds of the value. ``flights``: how many have a value.
+        ``centre_low`` and ``centre_high``: 90 %
         confidence interval of the value, as the centre of what all such flights give. ``power``: of
         "outside", for a published flight with errors half as large.
 
@@ -246,7 +247,10 @@ def read_metrics(path: Path) -> dict[str, Any]:
             kind=raw["kind"],
             seed=raw["seed"],
             seeds=raw["seeds"],
-            metrics=[metric(**entry) for entry in raw["metrics"]],
+            # What an earlier version wrote besides is of no use to this one.
+            metrics=[
+                metric(**{key: entry[key] for key in entry if key not in _GONE}) for entry in raw["metrics"]
+            ],
             claims=[claim(**entry) for entry in raw["claims"]],
         )
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:

@@ -23,7 +23,6 @@ from wildlab.analysis.overview import (
     Gain,
     Issue,
     Overview,
-    beside_satellites,
     length_of_way,
     troubled_for,
 )
@@ -40,19 +39,17 @@ from wildlab.analysis.verdict import (
     verdict_of,
 )
 from wildlab.evaluation.streams import FINE, FLOOR_HZ, HARMFUL
-from wildlab.flight.clocks import MAX_GAP_S, USUAL_STEPS, gnss_times
+from wildlab.flight.clocks import MAX_GAP_S, USUAL_STEPS
 from wildlab.messages import quantities
 from wildlab.messages.catalogue import Message, load_texts
 from wildlab.messages.quantities import FORMS, metres, number, percent_of
 from wildlab.names import listed
-from wildlab.reporting.charts import overview as charts
-from wildlab.reporting.georeferencing import show_advice, show_contradictions, words_of_causes
+from wildlab.reporting.charts import flights as charts
+from wildlab.reporting.georeferencing import show_advice, show_contradictions, span, words_of_causes
 from wildlab.reporting.report import Report, Wording
 
 #: Subject of what is recorded of the whole flight.
 FLIGHT = "flight"
-#: Positions closer than this are the same, but for rounding, m.
-SAME_M = 1e-3
 _UNITS = {"jumps": "m", "leans": "deg", "apart": "m", "shakes": "m/s^2"}
 
 
@@ -139,7 +136,7 @@ def alarm_message(alarm: Alarm, overview: Overview) -> Message:
         "size": size,
         "at": f"{alarm.worst - begin:.0f}",
         "share": percent_of(alarm.share),
-        "times": str(alarm.often),
+        "times": alarm.often,
     }
     once = "-once" if alarm.what == "jumps" and alarm.often == 1 else ""
     return Message(f"alarm-{alarm.what}{once}", values)
@@ -160,7 +157,7 @@ def answer(found: Judged) -> list[Message]:
     if found.verdict in (Verdict.ALARM, Verdict.MEND) and not said and not found.problems:
         said.append(Message("part", {"verdict": found.verdict.value}))
     if found.problems:
-        said.append(Message("problems", {"problems": str(found.problems)}))
+        said.append(Message("problems", {"problems": found.problems}))
     said += [gain_message(gain) for gain in (worth or found.gains)[:1]]
     if lasting:
         said.append(issue_message(max(lasting, key=lambda one: one.seconds), overview))
@@ -182,18 +179,18 @@ def reason(found: Judged, counts: Mapping[str, int]) -> Message:
     """Why the verdict is what it is: the most pressing of what was counted."""
     overview = found.overview
     if overview.alarms:
-        return Message("reason-alarms", {"count": str(len(overview.alarms))})
+        return Message("reason-alarms", {"count": len(overview.alarms)})
     if found.problems:
-        return Message("reason-problems", {"count": str(found.problems)})
+        return Message("reason-problems", {"count": found.problems})
     if counts["worth"]:
-        return Message("reason-worth", {"count": str(counts["worth"]), "share": percent_of(WORTH)})
+        return Message("reason-worth", {"count": counts["worth"], "share": percent_of(WORTH)})
     if found.doubts:
         return Message("reason-doubts", {"reports": listed(list(found.doubts))})
     if counts["troubled"]:
         return Message("reason-troubled", {"what": listed(troubles_of(overview, found.possible))})
     if found.verdict == Verdict.UNJUDGED:
         return Message("reason-unjudged")
-    return Message("reason-sound", {"count": str(found.judged)})
+    return Message("reason-sound", {"count": found.judged})
 
 
 def advice(found: Judged) -> list[Message]:
@@ -337,7 +334,7 @@ def streams_table(overview: Overview) -> pd.DataFrame:
 
 
 def satellites_table(overview: Overview) -> pd.DataFrame:
-    """What the receiver reports of its positions, and how far the poses are from them; maybe no rows."""
+    """What the receiver reports of its positions; maybe no rows."""
     gnss, rows = overview.flight.gnss, []
     names = load_texts("overview").quantities
     columns = {"satellites": "satellites", "sd_horizontal_m": "sd-horizontal", "sd_vertical_m": "sd-vertical"}
@@ -346,16 +343,6 @@ def satellites_table(overview: Overview) -> pd.DataFrame:
             values = gnss[column].to_numpy(float)
             worst = np.nanmin(values) if column == "satellites" else np.nanmax(values)
             rows.append({"what": names[key], "median": float(np.nanmedian(values)), "worst": float(worst)})
-    path = overview.path
-    if gnss is not None and path is not None and path.who.startswith("nav/") and path.timed:
-        gaps = overview.streams[path.who].gaps
-        _, off, _ = beside_satellites(overview.flight, path.times, path.place, gaps)
-        if len(off) and np.median(np.abs(off)) >= SAME_M:
-            level = np.hypot(off[:, 0], off[:, 1])
-            quantile = float(np.quantile(level, 0.95))
-            rows.append({"what": names["apart-level"], "median": float(np.median(level)), "worst": quantile})
-            above = float(np.median(-off[:, 2]))
-            rows.append({"what": names["apart-above"], "median": above, "worst": np.nan})
     return pd.DataFrame(rows, columns=["what", "median", "worst"])
 
 
@@ -407,16 +394,10 @@ def subtitle(overview: Overview) -> str:
         parts.append(quantities.way_length(way))
     if overview.above is not None and np.isfinite(overview.above[0]).any():
         low, high = np.nanquantile(overview.above[0], [0.05, 0.95])
-        if height := height_words(low, high):
-            parts.append(f"mostly {height} above {overview.above[1]}")
+        if high > 0.5:
+            parts.append(f"mostly {span([low, high])} m above {overview.above[1]}")
     parts.append(f"poses: {overview.source}" if overview.source else "no poses")
     return ", ".join(parts)
-
-
-def height_words(low: float, high: float) -> str:
-    """Between which heights (m): ``"59 to 61 m"``, ``"60 m"``; nothing where it never left the ground."""
-    below, above = round(low), round(high)
-    return f"{below} to {above} m" if below != above else f"{above} m" if above else ""
 
 
 def tiles(overview: Overview) -> list[tuple[str, str]]:
@@ -525,20 +506,6 @@ def _figures_over_time(overview: Overview, clock: charts.Clock) -> Iterator[tupl
         yield "speed", charts.lines_chart(speed, clock, "speed (m/s)", floor=True)
     if attitude := overview.series["attitude"]:
         yield "attitude", charts.attitude_chart(attitude, clock)
-    gnss = overview.flight.gnss
-    if gnss is not None and len(gnss):
-        times = gnss_times(overview.flight)
-        known = np.isfinite(times)
-
-        def column(name: str) -> tuple[np.ndarray, np.ndarray] | None:
-            there = name in gnss and gnss[name].notna().any()
-            return (times[known], gnss[name].to_numpy(float)[known]) if there else None
-
-        satellites = column("satellites")
-        sd = {"each horizontal axis": column("sd_horizontal_m"), "height": column("sd_vertical_m")}
-        reported = {name: series for name, series in sd.items() if series is not None}
-        if satellites is not None or reported:
-            yield "satellites", charts.satellites_chart(satellites, reported, clock)
     if overview.vibration is not None:
         vibration, times = overview.vibration
         yield "shaking", charts.shaking_chart(vibration, times, clock)

@@ -53,12 +53,6 @@ def bounds_of(values: pd.Series) -> tuple[float, float]:
     return prediction_interval(values)
 
 
-def share_below(values: pd.Series, printed: float) -> float:
-    """Which share of the flights lies below a printed number, those on it by halves; NaN for none known."""
-    known = values[np.isfinite(values)]
-    return float(((known < printed).mean() + (known <= printed).mean()) / 2) if len(known) else np.nan
-
-
 #: What a run recorded, by name and subject: entries of ``metrics.json``.
 Recorded = Mapping[tuple[str, str], Mapping[str, Any]]
 
@@ -98,7 +92,7 @@ def recorded_for(row: Mapping[str, Any], ours: Recorded) -> Mapping[str, Any]:
     if sizes is not None:
         return sizes
     # One flight has no spread, and its size needs no record of its own.
-    spread = dict.fromkeys(("low", "high", "below", "flights", "centre_low", "centre_high", "power"))
+    spread = dict.fromkeys(("low", "high", "flights", "centre_low", "centre_high", "power"))
     return {**found, **spread, "value": abs(found["value"])}
 
 
@@ -190,7 +184,7 @@ def compared_number(row: Mapping[str, Any], ours: Recorded, seeds: int | None, k
     if found.get("low") is not None:
         over = found["flights"] or seeds or (found["n"] if kind == "twin" else None)
     copied: dict[str, Any] = {key: row[key] for key in _COPIED}
-    copied |= {key: found.get(key) for key in ("low", "high", "below", "power")}
+    copied |= {key: found.get(key) for key in ("low", "high")}
     return Number(
         **copied,
         published=abs(float(row["value"])) if row["by_size"] else float(row["value"]),

@@ -321,7 +321,7 @@ def claims_table(rows: Sequence[tuple[str, str, str, str, str]]) -> Markup:
         (with_source(text, source), pill(verdict, PILLS.get(verdict, "")), *map(mark_up, effects))[:filled]
         for text, source, verdict, *effects in rows
     ]
-    heads = ("claim", "verdict", "true on", "difference")[:filled]
+    heads = ("claim", "verdict", "how often true", "difference")[:filled]
     return table(heads, cells, "Claims", text=range(4), wide=True, many=True)
 
 

@@ -36,20 +36,18 @@ from wildlab.messages.catalogue import Message, PageTexts, fill
 from wildlab.messages.quantities import known
 from wildlab.reporting import metrics as schema
 from wildlab.reporting.figures import figure_html, png_bytes, save_figure
-from wildlab.reporting.layout import ALERT, LIMITS, METHOD, VERDICT
+from wildlab.reporting.notebook_pages import ALERT, LIMITS, METHOD, VERDICT
 from wildlab.reporting.published import compared_number, judge, load_claims, published_rows
 from wildlab.reporting.published_tables import LONGEST, caption_of, claims_table, published_table
 from wildlab.reporting.status import Standing, standing
 from wildlab.reporting.text import PILLS, TAGS, csv_link, escape, inline, prose, slug, table_html
 
-LEVELS = ("good", "warn", "bad", "neutral")
 #: What is said where no number is known that anything could be said by.
 NOTHING_KNOWN = "Not known: there are too few observations."
 #: Points of an alert that are shown at once: what comes below must not leave the screen.
 ALERTS_SHOWN = 3
-
-#: Rows of a table that is still kept on one page of paper.
-LONGEST_UNBROKEN = 15
+#: Rows in sight of a table that has more than so many; the others are folded.
+ROWS_SHOWN, WHOLE = 9, 24
 _FILE_NAME = re.compile(r"[a-z0-9][a-z0-9-]*")
 
 
@@ -140,17 +138,11 @@ class Report:
         sentences
             The answer first.
         level
-            The colour of the bar: one of `LEVELS`.
+            The colour of the bar: "good", "warn", "bad" or "neutral".
         verdict
             The word that the colour means, and its reason in a sentence. Without one, `save` says how the
             numbers and claims of the study stand to the printed ones.
         """
-        if level not in LEVELS:
-            raise WildlabError(f"the level {level!r} is unknown", f"use one of: {', '.join(LEVELS)}")
-        if verdict is None and level != "neutral":
-            raise WildlabError(f"the colour {level!r} has no word", "give the verdict and its reason")
-        if not sentences:
-            raise WildlabError("the summary is empty", "give it a sentence")
         first, *others = [inline(one) for one in map(known, sentences) if one] or [NOTHING_KNOWN]
         text = " ".join([f"<b>{first.replace('<b>', '').replace('</b>', '')}</b>", *others])
         self._show(f'<section class="summary {level}" aria-label="Summary"><p>{text}</p></section>')
@@ -179,8 +171,8 @@ class Report:
             self._show(f'<ul class="tiles">{"".join(items)}</ul>')
 
     def section(self, title: str, intro: str = "", part: str = "") -> None:
-        """``<h2>`` and, if given, a paragraph. ``part`` is one of `wildlab.reporting.layout`: what to do
-        (`ADVICE`) stands before all other sections, wherever it was shown."""
+        """``<h2>`` and, if given, a paragraph. ``part`` is one of `wildlab.reporting.notebook_pages.ORDER`:
+        what to do (`ADVICE`) stands before all other sections, wherever it was shown."""
         marked = f' data-part="{part}"' if part else ""
         heading = f'<h2 id="{slug(title)}"{marked}>{inline(title)}</h2>'
         intro = known(intro)
@@ -235,7 +227,7 @@ class Report:
         digits: Mapping[str, int] | int | None = None,
         fold: str = "",
     ) -> None:
-        """A table without its index: numbers to the right, text to the left.
+        """A table without its index: numbers to the right, text to the left; the first rows of a long one.
 
         Parameters
         ----------
@@ -255,12 +247,17 @@ class Report:
             frame = frame[list(columns)]
         self._tables += 1
         name, caption = f"Table {self._tables}", known(caption)
-        body = table_html(frame, columns or {}, digits, caption or fold or name)
+        # A table behind a fold is whole.
+        shown = len(frame) if fold or len(frame) <= WHOLE else ROWS_SHOWN
+        about: tuple[Any, ...] = (columns or {}, digits, caption or fold or name)
+        body = str(table_html(frame[:shown], *about))
+        if len(frame) > shown:
+            rest = f"<summary>{len(frame) - shown} more rows</summary>{table_html(frame[shown:], *about)}"
+            body += f'<details class="plain">{rest}</details>'
         label = f"<b>{name}.</b> {inline(caption)}" if caption else ""
         if link := csv_link(frame, f"{self.study}-table-{self._tables}", f"{name} as CSV"):
             label += f' <span class="get">{link}</span>'
-        long = " long" if len(frame) > LONGEST_UNBROKEN else ""
-        html = f'<figure class="table{long}">{body}'
+        html = f'<figure class="table">{body}'
         html += f"<figcaption>{label}</figcaption></figure>" if label else "</figure>"
         self._show(f"<details><summary>{inline(fold)}</summary>{html}</details>" if fold else html)
 
@@ -487,17 +484,18 @@ class Wording:
         self.report.figure(fig, name=name, alt=alt, caption=caption, main=main)
 
     def table(self, key: str, frame: pd.DataFrame, values: Mapping[str, Any] | None = None) -> None:
-        """Show a table that has rows: in sight under its title, or folded away behind it."""
+        """Show a table that has rows, as far as it has the columns: in sight under its title, or folded away
+        behind it."""
         if frame.empty:
             return
         text = self.texts.tables[key]
         title, caption = self.say(text.title, values), self.say(text.caption, values)
-        columns = {name: self.say(heading, values) for name, heading in text.columns.items()} or None
+        columns = {name: self.say(heading, values) for name, heading in text.columns.items() if name in frame}
         if text.open:
             self.report.section(title)
         self.report.table(
             frame,
-            columns=columns,
+            columns=columns or None,
             digits=text.digits or None,
             caption=caption,
             fold="" if text.open else title,

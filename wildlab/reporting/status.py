@@ -6,7 +6,7 @@ import tomllib
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 from wildlab.evaluation.replication import Comparison, Reproduction
 from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY, MOSTLY_NOT, UNDECIDED
@@ -119,27 +119,6 @@ MISSING = "not reproduced yet"
 FIRST_LOOK = "first look"
 
 
-class ListedStudy(Protocol):
-    """What a page says of a study besides its numbers: an entry of ``studies.toml``."""
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def title(self) -> str: ...
-    @property
-    def case(self) -> str | None: ...
-    @property
-    def section(self) -> str: ...
-    @property
-    def kind(self) -> str: ...
-    @property
-    def twin(self) -> str | None: ...
-    @property
-    def dataset(self) -> str | None: ...
-    @property
-    def recipe(self) -> str | None: ...
-
-
 @dataclass(frozen=True)
 class Number:
     """A published number and ours.
@@ -147,8 +126,8 @@ class Number:
     ``compared`` is None where no run has given ours. ``waiting`` is `MISSING` then, `FIRST_LOOK` where ours
     are of a first look, and else "".
 
-    Where it is compared by its size, ``published``, ``here`` and the bounds are sizes. ``difference`` is ours
-    minus theirs, ``ratio`` ours to theirs; None where we have none, or where one is not above zero.
+    Where it is compared by its size, ``published``, ``here`` and the bounds are sizes. ``ratio`` is ours to
+    theirs; None where we have none, or where one is not above zero.
     """
 
     name: str
@@ -166,10 +145,6 @@ class Number:
     #: "calculated", "mean of runs", "one flight" or "share of images".
     kind: str = "one flight"
     ratio: float | None = None
-    #: The share of our flights that are below the published number.
-    below: float | None = None
-    #: The probability of "outside" for a published flight with errors half as large.
-    power: float | None = None
     by_size: bool = False
     #: What of ours was chosen by it; "" where nothing was.
     fitted: str = ""
@@ -177,10 +152,6 @@ class Number:
     again: bool = False
     #: Over how many flights ``low`` and ``high`` are; None where they are of another kind.
     over: int | None = None
-
-    @property
-    def difference(self) -> float | None:
-        return None if self.here is None else self.here - self.published
 
     @property
     def answers(self) -> tuple[str, str]:
@@ -204,7 +175,6 @@ class Claim:
     low: float | None = None
     high: float | None = None
     met: int | None = None
-    premise: str = ""
     #: A sentence of ours, not of a thesis.
     own: bool = False
 
@@ -215,7 +185,8 @@ class StudyStatus:
     ``reason`` says why it failed, what does not fit, or that the report has no digests; ``first_look`` what a
     first look shows of what ("5 of 200 flights")."""
 
-    study: ListedStudy
+    #: Its entry in ``studies.toml``.
+    study: Any
     state: str
     reason: str = ""
     seconds: float | None = None

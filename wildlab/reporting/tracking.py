@@ -27,11 +27,11 @@ from wildlab.analysis.tracks.tracker import (
     leading_filter,
     verdict,
 )
-from wildlab.analysis.verdict import VERDICT_LEVEL, Evidence, Verdict, verdict_of
+from wildlab.analysis.verdict import Evidence, Verdict, verdict_of
 from wildlab.flight.store import Flight
 from wildlab.messages.catalogue import Message, load_texts
 from wildlab.messages.quantities import NOTHING, length, significant
-from wildlab.reporting.charts import following as charts
+from wildlab.reporting.charts import tracks as charts
 from wildlab.reporting.figures import filter_words
 from wildlab.reporting.report import Report, Wording
 
@@ -210,9 +210,9 @@ def answer(rows: pd.DataFrame, pairs: Sequence[SensorPair]) -> list[Message]:
     known = shown.dropna(subset=[what])
     ratio = np.sqrt(known[what] / (2.0 if with_truth else known["dof"]))
     values = {
-        "n": str(len(mine)),
+        "n": len(mine),
         "filter": load_texts("tracking").subjects[str(mine["filter"].iloc[0])],
-        "judged": str(len(judged)),
+        "judged": len(judged),
         "rmse": length(float(shown["rmse"].median())) if with_truth else "",
         "times": significant(float(np.median(ratio)) if len(ratio) else np.nan),
         **{key: str(int((mine[column] == word).sum())) for key, word in _COUNTED.items()},
@@ -245,15 +245,15 @@ def _beside(
     # Where errors are as predicted, nothing else says so.
     if with_truth and (odd["verdict"] == CONSISTENT).any():
         times = significant(float(np.sqrt((odd["nis"] / odd["dof"]).median())))
-        return Message("surprised", {"tracks": str(len(odd)), "n": str(len(mine)), "times": times})
+        return Message("surprised", {"tracks": len(odd), "n": len(mine), "times": times})
     by_pair = rows.groupby(["sensor", "target"], sort=False)["detections"].max()
     if never := int((~(by_pair > 0)).sum()):
-        return Message("never-tracked", {"never": str(never), "of": str(len(by_pair))})
+        return Message("never-tracked", {"never": never, "of": len(by_pair)})
     if "restarts" in rows:
         each = rows.drop_duplicates(["sensor", "target"])
         if restarts := int(each["restarts"].sum()):
             gone, scans = int(each["untracked"].sum()), int(each["spanned"].sum())
-            return Message("restarted", {"times": str(restarts), "gone": str(gone), "looks": str(scans)})
+            return Message("restarted", {"times": restarts, "gone": gone, "looks": scans})
     if not with_truth:
         used = [one for one in pairs if one.filter == mine["filter"].iloc[0]]
         if not used:
@@ -408,10 +408,7 @@ def show_answer(
     report.head(
         names["question" if truth else "question-innovations"], f"targets: {targets}, sensors: {sensors}"
     )
-    word = judge_tracks(rows, pairs)
-    words = wording.messages(answer(rows, pairs))
-    report.summary(words, level=word.colour, verdict=(word.value, wording.messages([reason(rows)])[0]))
-    report.metric(VERDICT_LEVEL, "tracking", word.level, "1")
+    wording.summary(answer(rows, pairs), judge_tracks(rows, pairs), reason(rows), "tracking")
 
 
 def show_tracks(
@@ -443,11 +440,9 @@ def show_tracks(
     show_answer(report, followed, rows, pairs)
     if followed.notes:
         report.points(followed.notes)
-    table = tracks_table(rows)
-    text = wording.texts.tables["tracks"]
-    columns = {name: heading for name, heading in text.columns.items() if name in table}
-    report.section(text.title)
-    report.table(table, columns=columns, digits=text.digits, caption=text.caption)
+    # Those that the page speaks of are in sight.
+    leading = rows["filter"] == (leading_filter(rows) if len(rows) else "")
+    wording.table("tracks", tracks_table(pd.concat([rows[leading], rows[~leading]])))
     record_restarts(report, rows)
     _show_figures(report, flight, followed, rows, source)
     limits = ["truth" if followed.truth else "innovations", "same-detections"]
@@ -455,11 +450,8 @@ def show_tracks(
         limits.append("at-rest")
     report.limits(wording.messages(Message(f"limit-{one}") for one in limits))
     report.section("Details")
-    restarts = restarts_table(followed, rows)
-    if len(restarts):
-        wording.table("restarts", restarts)
-    if pairs:
-        wording.table("apart", apart_table(pairs))
+    wording.table("restarts", restarts_table(followed, rows))
+    wording.table("apart", apart_table(pairs))
     flights = {"tuned": tuned.flight if tuned is not None else "no other flight"}
     wording.table("parameters", parameters_table(followed.given), count_assumed(followed.given) | flights)
     report.method(wording.texts.method)

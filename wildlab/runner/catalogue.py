@@ -29,7 +29,7 @@ import difflib
 import re
 import tomllib
 from collections.abc import Sequence
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
@@ -97,19 +97,10 @@ class StudyEntry(BaseModel):
     def _consistent(self) -> StudyEntry:
         if not _NAME.fullmatch(self.name):
             raise ValueError("a study's name is made of a-z, 0-9 and hyphens")
-        for file in (self.notebook, self.recipe, *self.beside):
-            if file is not None and (PurePosixPath(file).is_absolute() or ".." in PurePosixPath(file).parts):
-                raise ValueError(f"the path {file!r} leaves its folder")
-        if self.twin and (self.dataset or self.recipe):
-            raise ValueError("a study has either a twin or a recipe")
-        if self.dataset and not self.recipe:
-            raise ValueError("a data set needs a recipe that imports it")
         if self.case is not None and self.case not in case_names():
             raise ValueError(f"there is no case {self.case!r}; use one of: {', '.join(case_names())}")
         if self.seeds is not None and "seeds" in self.parameters:
             raise ValueError("the number of seeds is given twice")
-        if self.beside and not self.recipe:
-            raise ValueError("flights beside the first need a recipe of the first")
         for name, few in self.first_look.items():
             whole = self.parameters.get(name)
             if isinstance(whole, bool) or not isinstance(whole, int | float) or not 0 <= few < whole:

@@ -11,15 +11,14 @@ from wildlab.errors import WildlabError
 from wildlab.files import write_atomic, write_csv
 from wildlab.flight.files import flight_name
 from wildlab.flight.manifest import FILE_NAME, read_manifest
-from wildlab.paths import NOTEBOOKS, REPORTS
+from wildlab.paths import REPORTS
 from wildlab.reporting.comparison import comparison_page, flights_table
-from wildlab.reporting.own_flights import OwnFlight
+from wildlab.reporting.front_page import OwnFlight
 from wildlab.runner.catalogue import load_studies
 from wildlab.runner.evaluate import evaluate_flight
-from wildlab.runner.record.digests import read_status
-from wildlab.runner.record.front_page import COMPARISON, build_ledger
-from wildlab.runner.record.own_flights import finished_metrics, own_flights
-from wildlab.runner.record.provenance import provenance_of_flight, read_provenance
+from wildlab.runner.ledger import COMPARISON, build_ledger, finished_metrics, own_flights
+from wildlab.runner.provenance import provenance_of_flight, read_provenance
+from wildlab.runner.status import read_status
 
 
 def compare_flights(
@@ -27,7 +26,6 @@ def compare_flights(
     *,
     into: Path | None = None,
     reports: Path = REPORTS,
-    notebooks: Path = NOTEBOOKS,
     console: Console | None = None,
 ) -> Path:
     """Write one page, and one table with a row for each flight.
@@ -57,7 +55,7 @@ def compare_flights(
     """
     if len(folders) < 2:
         raise WildlabError("there is nothing to compare: one flight was named", "name two flights or more")
-    studies = load_studies(notebooks / "studies.toml")
+    studies = load_studies()
     for folder in folders:
         if not (folder / FILE_NAME).is_file() and not (folder / "status.json").is_file():
             raise WildlabError(
@@ -70,7 +68,7 @@ def compare_flights(
         if (folder / FILE_NAME).is_file():
             name, where = flight_name(folder, read_manifest(folder / FILE_NAME).name), reports
             if not _is_current(folder, reports / f"{name}-overview"):
-                evaluate_flight(folder, reports=reports, notebooks=notebooks, console=console)
+                evaluate_flight(folder, reports=reports, console=console)
         else:
             status = read_status(folder)
             if status.get("state") == "damaged":

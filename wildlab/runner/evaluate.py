@@ -17,11 +17,11 @@ from wildlab.flight.checks.check import Use, find, usable_for
 from wildlab.flight.store import Flight, load_flight
 from wildlab.paths import NOTEBOOKS, REPORTS
 from wildlab.runner.catalogue import StudyEntry, load_studies
-from wildlab.runner.processes.job import Job, other_reports, typed_in_report
-from wildlab.runner.processes.scheduling import Outcome
-from wildlab.runner.record.own_flights import own_flights
-from wildlab.runner.record.provenance import provenance_of_flight, read_provenance
+from wildlab.runner.job import Job, other_reports, typed_in_report
+from wildlab.runner.ledger import own_flights
+from wildlab.runner.provenance import provenance_of_flight, read_provenance
 from wildlab.runner.run import make_job, run_all
+from wildlab.runner.scheduling import Outcome
 
 #: Files of a flight that two flights may have in common.
 _SHARED = ("flight", "truth", "terrain", "calibration")

@@ -28,13 +28,11 @@ from wildlab.reporting.report import Report, open_report
 from wildlab.runner import vary
 from wildlab.runner.catalogue import StudyEntry, find_study, load_studies
 from wildlab.runner.flights import flights_for
-from wildlab.runner.processes.worker_pool import compute_seeds
 from wildlab.runner.seeds import (
-    damaged_line,
     make_work,
     read_seed,
-    set_aside,
 )
+from wildlab.runner.worker_pool import compute_seeds
 from wildlab.studies.monte_carlo import record_spread
 from wildlab.studies.page import Shown, show_page, show_twins
 from wildlab.studies.protocol import Study, find_case, split_keys
@@ -252,8 +250,6 @@ def trials_table(
     """
     reports = Path(out).parent if out else REPORTS
     work = make_work(reports, study, case, seed, seeds, parameters)
-    if damaged := set_aside(work):
-        print(f"{study}: {damaged_line(damaged)}")
     failures = compute_seeds(
         [work], 1, lambda done, count: print(f"\r{study}: {done} of {count} seeds", end="")
     )

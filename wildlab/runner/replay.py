@@ -23,7 +23,7 @@ from wildlab.replay.page import page
 from wildlab.replay.recording import save_recording
 from wildlab.replay.scene import ReplayScene, scene_of
 from wildlab.runner.evaluate import tell_source
-from wildlab.runner.record.provenance import flight_of_report, provenance_of_flight, read_provenance
+from wildlab.runner.provenance import flight_of_report, provenance_of_flight, read_provenance
 
 PAGE, RECORDING, ESTIMATES = "replay.html", "replay.rrd", "estimates.parquet"
 

@@ -33,12 +33,12 @@ from wildlab.runner.catalogue import (
     find_studies,
     load_studies,
 )
-from wildlab.runner.processes.job import Job, other_reports, typed_in_report
-from wildlab.runner.processes.progress import outcome_line, pass_line, shown
-from wildlab.runner.processes.scheduling import Listener, Outcome, run_jobs
-from wildlab.runner.record.digests import read_status
-from wildlab.runner.record.front_page import build_ledger
+from wildlab.runner.job import Job, other_reports, typed_in_report
+from wildlab.runner.ledger import build_ledger
+from wildlab.runner.progress import outcome_line, pass_line, shown
+from wildlab.runner.scheduling import Listener, Outcome, run_jobs
 from wildlab.runner.seeds import SeedWork, code_key, make_work, missing_seeds, page_key
+from wildlab.runner.status import read_status
 
 #: Guessed seconds of a study that has not been run here yet. Only their order matters.
 GUESSED_S = {"computed": 5.0, "logged": 30.0, "twin": 60.0}
@@ -143,9 +143,12 @@ def _seed_work(
     case = study.shown_case()
     if case is None:
         return None
-    twin = study.twin if flight is None else _twin_of(flight)
-    if flight is not None and twin is None:
-        return None  # a logged flight is the only one of its kind
+    twin = study.twin
+    if flight is not None:
+        simulated = read_manifest(flight / FILE_NAME).twin
+        if simulated is None:
+            return None  # a logged flight is the only one of its kind
+        twin = simulated.name
     given = {**parameters, "twin": twin}
     return make_work(reports, name, case.case, seed, parameters["seeds"], given)
 
@@ -312,12 +315,6 @@ def run_all(
 
 def _flight_name(folder: Path) -> str:
     return flight_name(folder, read_manifest(folder / FILE_NAME).name)
-
-
-def _twin_of(folder: Path) -> str | None:
-    """Name of the twin that a flight folder was simulated from; None for a logged flight."""
-    twin = read_manifest(folder / FILE_NAME).twin
-    return None if twin is None else twin.name
 
 
 def _absent_data(study: StudyEntry) -> WildlabError | None:

@@ -10,13 +10,11 @@ infinity: they are the texts "nan", "inf" and "-inf".
 
 Each file carries a digest of all that it says, and it is read only where it is, byte for byte, what would be
 written for the numbers that stand in it: a bit that the disk has turned, a number gone or added by hand, or a
-file of another key or seed would else become a verdict. Such a file is *damaged*: it is set aside as
-``<seed>.damaged``, and its seed is computed again.
+file of another key or seed would else become a verdict. Such a file is damaged: its seed is computed again.
 """
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import json
 import math
@@ -26,7 +24,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from wildlab.errors import WildlabError
 from wildlab.files import digest, write_atomic
@@ -139,13 +137,12 @@ class SeedWork:
     seeds: tuple[int, ...]
 
     def provenance(self) -> dict[str, Any]:
-        """What ``provenance.json`` says about the seeds: what their numbers depend on, the digest of each
-        seed's and of all of them, and which seeds were computed again because what was kept was damaged."""
+        """What ``provenance.json`` says about the seeds: what their numbers depend on, and the digest of each
+        seed's and of all of them."""
         kept = {seed: read_seed(self, seed) for seed in self.seeds}
         digests = {
             str(seed): seed_digest(self, seed, values) for seed, values in kept.items() if values is not None
         }
-        damaged = [seed for seed in self.seeds if _aside(self, seed).exists()]
         return {
             "case": self.case,
             "parameters": self.parameters,
@@ -153,7 +150,6 @@ class SeedWork:
             "seeds": list(self.seeds),
             "digests": digests,
             "digest": hashlib.sha256(json.dumps(digests).encode()).hexdigest(),
-            "damaged": {"count": len(damaged), "seeds": damaged},
         }
 
     @property
@@ -218,53 +214,17 @@ def write_seed(work: SeedWork, seed: int, values: Values) -> None:
 
 def read_seed(work: SeedWork, seed: int) -> Values | None:
     """A seed's numbers, or None where they are not there or the file is not as it was written."""
-    return _look(work, seed).values
+    try:
+        text = _file(work, seed).read_bytes().decode("utf-8")
+        values = {str(name): float(value) for name, value in json.loads(text)["values"].items()}
+        return values if text == _text(work, seed, values) else None
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return None
 
 
 def missing_seeds(work: SeedWork) -> list[int]:
     """The seeds that are to be computed, ascending: nothing is there, or it is damaged."""
-    return [seed for seed in work.seeds if _look(work, seed).values is None]
-
-
-def set_aside(work: SeedWork) -> list[int]:
-    """Move damaged files to ``<seed>.damaged``, and list their seeds.
-
-    There they can be looked at, and `SeedWork.provenance` finds that there were any even if the run that
-    computes them again is broken off.
-    """
-    damaged = [seed for seed in work.seeds if _look(work, seed).damaged]
-    for seed in damaged:
-        # Another run may be faster.
-        with contextlib.suppress(FileNotFoundError):
-            _file(work, seed).replace(_aside(work, seed))
-    return damaged
-
-
-def damaged_line(damaged: Sequence[int]) -> str:
-    """What a run says of kept numbers that it does not use."""
-    shown = _first(damaged)
-    return (
-        "kept numbers are damaged and are computed again: "
-        f"{len(damaged)} seed{'s' * (len(damaged) != 1)} ({shown})"
-    )
-
-
-class _Look(NamedTuple):
-    values: Values | None
-    damaged: bool = False
-
-
-def _look(work: SeedWork, seed: int) -> _Look:
-    try:
-        text = _file(work, seed).read_bytes().decode("utf-8")
-        content = json.loads(text)
-        values = {str(name): float(value) for name, value in content["values"].items()}
-        intact = text == _text(work, seed, values)
-    except FileNotFoundError:
-        return _Look(None)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        return _Look(None, damaged=True)
-    return _Look(values) if intact else _Look(None, damaged=True)
+    return [seed for seed in work.seeds if read_seed(work, seed) is None]
 
 
 def _text(work: SeedWork, seed: int, values: Values) -> str:
@@ -288,19 +248,12 @@ def _file(work: SeedWork, seed: int) -> Path:
     return work.folder / f"{seed}.json"
 
 
-def _aside(work: SeedWork, seed: int) -> Path:
-    return work.folder / f"{seed}.damaged"
-
-
 def _first(seeds: Sequence[int]) -> str:
     return ", ".join(str(seed) for seed in seeds[:8]) + (", ..." if len(seeds) > 8 else "")
 
 
 def sweep_seeds(work: SeedWork) -> None:
-    """Remove what is there under other keys, and halves of files that a machine has left when it stopped.
-
-    What was set aside as damaged under this key stays: the numbers that took its place are still in use.
-    """
+    """Remove what is there under other keys, and halves of files that a machine has left when it stopped."""
     for folder in work.folder.parent.glob("*"):
         if folder.name != work.key:
             shutil.rmtree(folder, ignore_errors=True)

@@ -25,10 +25,10 @@ from wildlab.flight.store import Flight, load_flight
 from wildlab.paths import NOTEBOOKS, REPORTS
 from wildlab.runner.catalogue import StudyEntry, load_studies
 from wildlab.runner.evaluate import refuse_other_flight, refuse_study_name, tell_source
-from wildlab.runner.processes.job import Job, other_reports, typed_in_report
-from wildlab.runner.processes.progress import shown
-from wildlab.runner.processes.scheduling import Outcome, run_jobs
+from wildlab.runner.job import Job, other_reports, typed_in_report
+from wildlab.runner.progress import shown
 from wildlab.runner.run import make_job, run_all
+from wildlab.runner.scheduling import Outcome, run_jobs
 
 #: The notebook on all targets at once.
 MANY_NOTEBOOK = "tracking-many.ipynb"

@@ -23,10 +23,10 @@ from wildlab.files import digest, write_atomic
 from wildlab.paths import DATA, NOTEBOOKS, PACKAGE, REPORTS
 from wildlab.reporting.notebook_pages import read_notebook
 from wildlab.runner.catalogue import load_studies
-from wildlab.runner.processes.job import Job
-from wildlab.runner.processes.progress import shown
-from wildlab.runner.processes.scheduling import Outcome, run_jobs
-from wildlab.runner.record.front_page import build_ledger, title_of, tutorial_links, tutorial_notebooks
+from wildlab.runner.job import Job
+from wildlab.runner.ledger import build_ledger, title_of, tutorial_links, tutorial_notebooks
+from wildlab.runner.progress import shown
+from wildlab.runner.scheduling import Outcome, run_jobs
 from wildlab.runner.seeds import code_key
 
 #: What a tutorial shows comes out of these besides the rooms below them (`wildlab.runner.seeds`).
@@ -35,7 +35,7 @@ _SHOWING = (
     "reporting/**/*.py",
     "summary_table.py",
     "runner/tutorials.py",
-    "runner/processes/notebook_process.py",
+    "runner/notebook_process.py",
 )
 _PACKAGES = ("matplotlib", "nbconvert", "latex2mathml")
 
@@ -45,7 +45,6 @@ def run_tutorials(
     notebooks: Path = NOTEBOOKS,
     *,
     parallel: int = 1,
-    timeout_s: float = 600.0,
     console: Console | None = None,
 ) -> list[Outcome]:
     """Run the tutorials whose pages are not there or out of date, and write their pages.
@@ -58,8 +57,6 @@ def run_tutorials(
         Where the tutorials are, in ``tutorials``.
     parallel
         How many at once.
-    timeout_s
-        How long each may take.
     console
         Where progress is shown; nowhere if not given.
 
@@ -79,7 +76,7 @@ def run_tutorials(
     reports = reports.resolve()
     (reports / "tutorials").mkdir(parents=True, exist_ok=True)
     marks = {path: _mark(path) for path in found}
-    jobs = {path: _job(path, reports, timeout_s) for path in found if not _kept(path, reports, marks[path])}
+    jobs = {path: _job(path, reports) for path in found if not _kept(path, reports, marks[path])}
     # A terminal shows a bar; elsewhere each has a line of its own.
     if console is not None:
         with shown(console) as listen:
@@ -91,7 +88,7 @@ def run_tutorials(
     return outcomes
 
 
-def _job(path: Path, reports: Path, timeout_s: float) -> Job:
+def _job(path: Path, reports: Path) -> Job:
     name = f"tutorial-{path.stem}"
     return Job(
         name=name,
@@ -100,7 +97,7 @@ def _job(path: Path, reports: Path, timeout_s: float) -> Job:
         work=str(reports / f".{name}.{os.getpid()}.part"),
         reports=str(reports),
         again="python -m wildlab.runner.tutorials",
-        timeout_s=timeout_s,
+        timeout_s=600.0,
         cells=len(read_notebook(path).cells),
         tutorial=True,
     )

@@ -18,12 +18,11 @@ import pandas as pd
 
 from wildlab.errors import RunFailed, WildlabError
 from wildlab.files import write_json
-from wildlab.paths import NOTEBOOKS, REPORTS
+from wildlab.paths import REPORTS
 from wildlab.reporting.published import judge, load_claims, published_rows
 from wildlab.reporting.report import open_report
 from wildlab.reporting.text import slug
 from wildlab.runner.catalogue import StudyEntry, find_study, load_studies
-from wildlab.runner.processes.worker_pool import compute_seeds
 from wildlab.runner.seeds import (
     SeedWork,
     make_work,
@@ -32,6 +31,7 @@ from wildlab.runner.seeds import (
     sweep_seeds,
     trial_key,
 )
+from wildlab.runner.worker_pool import compute_seeds
 from wildlab.simulation import load_twin
 from wildlab.simulation.variation import groups_of
 from wildlab.studies.monte_carlo import decide_claims, record_spread
@@ -60,7 +60,6 @@ def vary_study(
     factors: Sequence[float] = FACTORS,
     seeds: int = SEEDS,
     reports: Path = REPORTS,
-    notebooks: Path = NOTEBOOKS,
     parallel: int = 1,
     tell: Callable[[str], None] = lambda line: None,
 ) -> pd.DataFrame:
@@ -92,7 +91,7 @@ def vary_study(
         If the study is unknown or has no trial on simulated flights, a factor is not above zero, or its twin
         cannot be computed as it is.
     """
-    study = find_study(name, load_studies(notebooks / "studies.toml"))
+    study = find_study(name, load_studies())
     case = study.shown_case()
     if case is None or study.twin is None:
         raise WildlabError(

@@ -16,15 +16,13 @@ from wildlab.flight.calibration_files import Learnt, parse_learnt, read_learnt, 
 from wildlab.flight.files import dump_toml
 from wildlab.flight.manifest import parse_settings
 from wildlab.flight.store import CALIBRATION, Flight, save_flight
-from wildlab.paths import NOTEBOOKS
+from wildlab.reporting.front_page import OwnFlight
 from wildlab.reporting.metrics import AGAINST
-from wildlab.reporting.own_flights import OwnFlight
 from wildlab.runner.evaluate import evaluate_flight
-from wildlab.runner.processes.scheduling import Outcome
-from wildlab.runner.record.own_flights import ABOUT, finished_metrics, own_flights
+from wildlab.runner.ledger import ABOUT, finished_metrics, own_flights
+from wildlab.runner.scheduling import Outcome
 from wildlab.runner.track import track_many
-from wildlab.sharing.generalisation import Generalised, neutral_learnt
-from wildlab.sharing.names import Names, neutral_settings
+from wildlab.sharing.generalisation import Generalised, Names, neutral_learnt, neutral_settings
 from wildlab.sharing.reports import ENDS, MANY, Source
 from wildlab.sharing.tiers import describe
 
@@ -93,7 +91,6 @@ def recompute_reports(
     source: Source,
     work: Path,
     *,
-    notebooks: Path = NOTEBOOKS,
     console: Console | None = None,
 ) -> RecomputedReports:
     """Make the reports of a flight again from its generalised copy.
@@ -106,7 +103,7 @@ def recompute_reports(
         Its reports here, whose parameters are used again.
     work
         A folder to work in, which is gone afterwards.
-    notebooks, console
+    console
         As for `evaluate_flight`.
 
     Returns
@@ -133,13 +130,12 @@ def recompute_reports(
         source=told["source"],
         calibration=applied,
         reports=reports,
-        notebooks=notebooks,
         console=console,
     )
     done = {one.name for one in source.folders}
     several = f"{source.name}{MANY}" in done
     if several:
-        outcome, more = _many(copy, made, source, work, reports, notebooks, console)
+        outcome, more = _many(copy, made, source, work, reports, console)
         outcomes = [*outcomes, outcome]
         told["notes"] += more
     failed = [outcome for outcome in outcomes if outcome.state == "failed"]
@@ -176,7 +172,6 @@ def _many(
     source: Source,
     work: Path,
     reports: Path,
-    notebooks: Path,
     console: Console | None,
 ) -> tuple[Outcome, list[str]]:
     """The report on many targets, told what the sender's was told; and notes for the sender."""
@@ -199,7 +194,6 @@ def _many(
             settings=file,
             source=made.names.of("poses", str(poses)) if poses else None,
             reports=reports,
-            notebooks=notebooks,
             console=console,
         )
     except WildlabError as error:

@@ -11,16 +11,16 @@ from wildlab.errors import WildlabError
 from wildlab.flight.manifest import FILE_NAME, read_manifest
 from wildlab.paths import REPORTS
 from wildlab.runner.catalogue import StudyEntry
-from wildlab.runner.processes.job import typed
-from wildlab.runner.record.digests import BEFORE_DIGESTS, has_digests, read_status
-from wildlab.runner.record.own_flights import ABOUT
-from wildlab.runner.record.provenance import (
+from wildlab.runner.job import typed
+from wildlab.runner.ledger import ABOUT
+from wildlab.runner.provenance import (
     flight_of_report,
     flights_near,
     provenance_of_flight,
     read_provenance,
     same_flight,
 )
+from wildlab.runner.status import BEFORE_DIGESTS, has_digests, read_status
 from wildlab.runner.track import MANY_NOTEBOOK
 from wildlab.simulation.parameters import load_twin, twin_names
 

@@ -33,8 +33,7 @@ from wildlab.geometry.frames import Array, ned_to_geodetic
 from wildlab.geometry.gravity import normal_gravity
 from wildlab.paths import ROOT
 from wildlab.sharing.allow_list import DATA_ADDRESS, FORMS, own_phrases, own_vocabulary
-from wildlab.sharing.generalisation import Generalised, first_stamp, new_origin
-from wildlab.sharing.names import names_in
+from wildlab.sharing.generalisation import Generalised, first_stamp, names_in, new_origin
 from wildlab.sharing.reports import Source
 from wildlab.sharing.tiers import Treatment, describe
 

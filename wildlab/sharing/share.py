@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
+import glob
 import io
 import os
 import shutil
@@ -22,12 +24,10 @@ from wildlab.files import write_atomic
 from wildlab.flight.manifest import FILE_NAME
 from wildlab.flight.store import Flight, confirmed_locations, load_flight
 from wildlab.messages.catalogue import Day, Language, load_language, load_texts
-from wildlab.paths import NOTEBOOKS, REPORTS
+from wildlab.paths import REPORTS
 from wildlab.runner.catalogue import load_studies
-from wildlab.sharing.allow_list import first_foreign_word
-from wildlab.sharing.document import Chapter, join_chapters, read_part
-from wildlab.sharing.edition import edition_html, map_of
-from wildlab.sharing.edition_story import facts_of
+from wildlab.sharing.allow_list import Chapter, first_foreign_word, join_chapters, read_part
+from wildlab.sharing.edition import edition_html, facts_of, map_of
 from wildlab.sharing.generalisation import Generalised, generalise
 from wildlab.sharing.recomputation import RecomputedReports, describe_agreement, recompute_reports
 from wildlab.sharing.reports import Source, flight_folder, sources_of
@@ -95,7 +95,6 @@ def share(
     edition: str | Path | None = None,
     overwrite: bool = False,
     reports: Path = REPORTS,
-    notebooks: Path = NOTEBOOKS,
     console: Console | None = None,
 ) -> Shared:
     """Make a copy of a flight's reports, of a study's, or of all in a folder, that is safe to send.
@@ -119,8 +118,8 @@ def share(
         reports, otherwise it is the copy.
     overwrite
         Whether a file that is there may be replaced.
-    reports, notebooks, console
-        Where reports on a flight's folder and the notebooks are, and where progress is shown.
+    reports, console
+        Where reports on a flight's folder are, and where progress is shown.
 
     Returns
     -------
@@ -136,7 +135,7 @@ def share(
     zipped = zipped or password is not None
     if password is not None:
         check_password(password)
-    studies = load_studies(notebooks / "studies.toml")
+    studies = load_studies()
     sources, left_out = sources_of(report, studies, reports)
     if flight is None and (report / FILE_NAME).is_file():
         flight = report
@@ -163,7 +162,7 @@ def share(
     for source, name, one in zip(sources, calls, prepared, strict=True):
         first = 1 + sum(len(document.chapter.parts) for document in documents)
         if one is not None:
-            documents.append(_generalised(one, source, tier, first, words, notebooks, console))
+            documents.append(_generalised(one, source, tier, first, words, console))
         else:
             documents.append(_copied(source, tier, name, first))
     pages = _pages(documents, target, zipped, len(flights))
@@ -174,8 +173,7 @@ def share(
     )
     files = {name: page.encode("utf-8") for name, page in pages.items()}
     put(zip_bytes(files, password) if zipped else files[target.name], target, overwrite)
-    write_atomic(told, "\n".join(lines) + "\n")
-    told.chmod(0o600)
+    put(("\n".join(lines) + "\n").encode("utf-8"), told, overwrite, mode=0o600)
     return Shared(target, told, tuple(lines))
 
 
@@ -226,13 +224,12 @@ def _generalised(
     tier: Tier,
     first: int,
     words: Language | None,
-    notebooks: Path,
     console: Console | None,
 ) -> _Document:
     """A flight's reports, drawn again."""
     made, treatment, name = one.made, one.treatment, one.made.flight.name
     with private_folder() as work:
-        drawn = recompute_reports(one.flight, made, source, work, notebooks=notebooks, console=console)
+        drawn = recompute_reports(one.flight, made, source, work, console=console)
         parts = [
             read_part(folder / "report.html", number, exact=False, generalised=True)
             for number, folder in enumerate(drawn.folders.values(), first)
@@ -381,6 +378,8 @@ _TIME = (1980, 1, 1, 0, 0, 0)
 SHORTEST = 12
 
 
+#: How the name of a `private_folder` begins.
+_PREFIX = "wildlab-share-"
 #: Waits until the process that started it is gone, however it ended, and removes a folder until it stays
 #: away: what that process had started may still write into it.
 _WATCH = """
@@ -398,9 +397,13 @@ for _ in range(20):
 def private_folder() -> Iterator[Path]:
     """A folder among the system's temporary ones that nobody else may open; gone afterwards, however it ends.
 
-    A process of its own watches over it, so that nothing is left where this one is killed.
+    A process of its own watches over it, so that nothing is left where this one is killed. Those that a
+    machine has left when it stopped go first: nobody holds their lock any more.
     """
-    with tempfile.TemporaryDirectory(prefix="wildlab-share-") as folder:
+    for left in Path(tempfile.gettempdir()).glob(f"{_PREFIX}*"):
+        with contextlib.suppress(OSError), _held(left):
+            shutil.rmtree(left, ignore_errors=True)
+    with tempfile.TemporaryDirectory(prefix=_PREFIX) as folder, _held(Path(folder)):
         command = [sys.executable, "-I", "-S", "-c", _WATCH, folder]
         watch = subprocess.Popen(  # noqa: S603 - our own words
             command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
@@ -411,6 +414,17 @@ def private_folder() -> Iterator[Path]:
         finally:
             shutil.rmtree(folder, ignore_errors=True)
             watch.communicate()
+
+
+@contextlib.contextmanager
+def _held(folder: Path) -> Iterator[None]:
+    """Hold a folder's lock, which ends with this process, however that ends; OSError where another has it."""
+    handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
+    finally:
+        os.close(handle)
 
 
 def refuse_existing(target: Path, overwrite: bool) -> None:
@@ -470,8 +484,8 @@ def zip_bytes(files: Mapping[str, bytes], password: str | None = None) -> bytes:
     return whole.getvalue()
 
 
-def put(content: bytes, target: Path, overwrite: bool) -> None:
-    """Write a finished file, whole or not at all.
+def put(content: bytes, target: Path, overwrite: bool, mode: int = 0o644) -> None:
+    """Write a finished file, whole or not at all; half of one that a machine left when it stopped goes.
 
     Raises
     ------
@@ -480,4 +494,6 @@ def put(content: bytes, target: Path, overwrite: bool) -> None:
     """
     refuse_existing(target, overwrite)
     target.parent.mkdir(parents=True, exist_ok=True)
-    write_atomic(target, content)
+    for part in target.parent.glob(f".{glob.escape(target.name)}.*"):
+        part.unlink(missing_ok=True)
+    write_atomic(target, content, mode)

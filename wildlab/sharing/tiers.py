@@ -266,12 +266,13 @@ def describe_place(cell: Cell | None) -> str:
     """Where it was, in words; without a cell, that it is not told."""
     if cell is None:
         return describe("withheld")
+    metres = cell.uncertainty_m
     return describe(
         "cell",
         latitude=_side(cell.latitude_deg, "N", "S"),
         longitude=_side(cell.longitude_deg, "E", "W"),
         size=f"{cell.size_deg:g}",
-        uncertainty=format_distance(cell.uncertainty_m),
+        uncertainty=f"{metres / 1e3:g} km" if metres >= 1e3 else f"{metres:g} m",
     )
 
 
@@ -281,11 +282,6 @@ def describe_generalisation(cell: Cell | None, category: int) -> str:
         return describe("information-withheld", category=category)
     size, metres = f"{cell.size_deg:g}", f"{cell.uncertainty_m:.0f}"
     return describe("data-generalizations", category=category, size=size, metres=metres)
-
-
-def format_distance(metres: float) -> str:
-    """``"6.3 km"``, ``"130 m"``: two digits as they are."""
-    return f"{metres / 1e3:g} km" if metres >= 1e3 else f"{metres:g} m"
 
 
 def _side(value: float, positive: str, negative: str) -> str:

@@ -24,7 +24,6 @@ from wildlab.reporting.published import (
     SHARE_OF_IMAGES,
     bounds_of,
     quantity_kind,
-    share_below,
     size_name,
 )
 from wildlab.reporting.report import Report
@@ -35,7 +34,7 @@ CLAIM_COLUMNS = {
     "claim": "claim",
     "source": "where",
     "verdict": "verdict",
-    "share": "true on",
+    "share": "how often true",
     "difference": "difference, mean",
     "premise": "premise",
     "threshold": "at half and twice the threshold",
@@ -84,10 +83,9 @@ def record_spread(
                     flights=int(values.notna().sum()), centre_low=centre.low, centre_high=centre.high,
                 )  # fmt: skip
                 continue
-        value = None if printed is None else float(printed["value"])
-        _record(report, name, subject, values, unit, n.get(subject), value)
-        if value is not None and quantity_kind(name) == "signed mean" and len(values) > 1:
-            _record(report, size_name(name), subject, values.abs(), unit, n.get(subject), abs(value))
+        _record(report, name, subject, values, unit, n.get(subject))
+        if printed is not None and quantity_kind(name) == "signed mean" and len(values) > 1:
+            _record(report, size_name(name), subject, values.abs(), unit, n.get(subject))
 
 
 def pooled_share(spread: pd.DataFrame, subject: str, name: str) -> tuple[Interval, int]:
@@ -121,10 +119,8 @@ def _record(
     values: pd.Series,
     unit: str,
     n: int | None,
-    printed: float | None,
 ) -> None:
     low, high = bounds_of(values)
-    below = None if printed is None else share_below(values, printed)
     centre_low, centre_high = median_interval(values)
     kind = quantity_kind(name)
     report.metric(
@@ -135,7 +131,6 @@ def _record(
         n=n,
         low=low,
         high=high,
-        below=below,
         flights=int(np.isfinite(values).sum()),
         centre_low=centre_low,
         centre_high=centre_high,

@@ -43,7 +43,7 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
 from wildlab.messages.catalogue import Message, load_texts
 from wildlab.messages.quantities import significant
-from wildlab.reporting.charts.navigation import (
+from wildlab.reporting.charts.flights import (
     bias_chart,
     error_bands,
     mark_period,

@@ -15,7 +15,7 @@ from wildlab.evaluation.errors import summarise
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import Flight
 from wildlab.reporting.charts.drawing import correlations_chart
-from wildlab.reporting.charts.navigation import poses_between, strips
+from wildlab.reporting.charts.flights import poses_between, strips
 from wildlab.reporting.charts.tracks import aircraft_map, error_scatter, errors_over_time
 from wildlab.reporting.figures import BLUE, VERMILLION, colour
 from wildlab.simulation.onboard_sensors import as_mounted, mounted_imu

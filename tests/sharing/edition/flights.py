@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from wildlab.analysis.verdict import Gain
+from wildlab.reporting.front_page import OwnFlight, OwnReport
 from wildlab.reporting.metrics import metric
-from wildlab.reporting.own_flights import OwnFlight, OwnReport
-from wildlab.sharing.edition_story import Facts
+from wildlab.sharing.edition import Facts
 
 NAN = math.nan
 

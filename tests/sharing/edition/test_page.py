@@ -21,17 +21,17 @@ from wildlab.geometry.georeference import georeference_pixels
 from wildlab.messages.catalogue import Day, load_language
 from wildlab.reporting.metrics import metric
 from wildlab.reporting.text import POLICY
-from wildlab.runner.record.own_flights import own_flights
+from wildlab.runner.ledger import own_flights
 from wildlab.sharing.edition import (
     FOOT,
     HEIGHT,
     WIDTH,
     MapPicture,
     edition_html,
+    facts_of,
     map_of,
     picture_html,
 )
-from wildlab.sharing.edition_story import facts_of
 from wildlab.sharing.tiers import Cell
 
 MAP = MapPicture(

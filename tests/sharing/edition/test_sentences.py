@@ -12,7 +12,7 @@ from tests.sharing.edition.flights import EMPTY, NAN, WHOLE
 from wildlab.analysis.overview import ALARMS, Alarm
 from wildlab.analysis.verdict import CAUSES, PARTS, Gain, Verdict
 from wildlab.messages.catalogue import Message, languages, length, load_language, say
-from wildlab.sharing.edition_story import _TROUBLES, STEP_M, Facts, Story, steps_of, tell
+from wildlab.sharing.edition import _TROUBLES, STEP_M, Facts, Story, steps_of, tell
 
 LANGUAGES = [load_language(code) for code in languages()]
 RADAR = EMPTY._replace(

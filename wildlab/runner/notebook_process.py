@@ -19,8 +19,8 @@ from typing import Any
 
 from wildlab.errors import WildlabError
 from wildlab.paths import ROOT
-from wildlab.runner.processes.ending import end_below
-from wildlab.runner.processes.job import Failure, Job
+from wildlab.runner.job import Failure, Job
+from wildlab.runner.processes import end_below
 
 #: The cells begun in this process, in order.
 _STARTED: list[int] = []
@@ -92,8 +92,8 @@ def _work(pipe: connection.Connection, job: Job) -> None:
     from wildlab.reporting import metrics, notebook_pages
     from wildlab.reporting.status import describe_first_look
     from wildlab.reporting.text import first_look_notice
+    from wildlab.runner import provenance
     from wildlab.runner.catalogue import OTHERS
-    from wildlab.runner.record import provenance
 
     started = time.monotonic()
     folder = Path(job.work)
@@ -156,7 +156,7 @@ def _tutorial(pipe: connection.Connection, job: Job) -> None:
     """A notebook that takes no parameters and leaves no numbers: only its page."""
     from wildlab.files import write_atomic
     from wildlab.reporting import notebook_pages
-    from wildlab.runner.record import provenance
+    from wildlab.runner import provenance
 
     pipe.send(("stage", "notebook"))
     notebook = _execute(pipe, job, {}, Path(job.work) / "notebook.ipynb")
@@ -204,7 +204,7 @@ def _relative(flight: Path | None, job: Job) -> str:
 
 def _execute(pipe: connection.Connection, job: Job, parameters: dict[str, Any], executed: Path) -> Any:
     from wildlab.reporting.notebook_pages import read_notebook
-    from wildlab.runner.processes.shell import execute_notebook
+    from wildlab.runner.shell import execute_notebook
 
     def on_cell(index: int, count: int) -> None:
         _STARTED.append(index)
@@ -218,7 +218,7 @@ def _explain(error: BaseException, job: Job) -> Failure:
     import traceback
 
     from wildlab.reporting.notebook_pages import clean_text, read_notebook, step_of
-    from wildlab.runner.processes.shell import CellError
+    from wildlab.runner.shell import CellError
 
     details = "".join(traceback.format_exception(error))
     if isinstance(error, CellError):

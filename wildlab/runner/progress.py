@@ -19,7 +19,7 @@ from rich.progress import (
 )
 from rich.table import Column
 
-from wildlab.runner.processes.job import Job
+from wildlab.runner.job import Job
 
 _STAGES = {"flight": "preparing the flight", "notebook": "starting", "page": "writing the page"}
 _ENDS = {"done": "[green]done[/]", "failed": "[red]failed[/]", "skipped": "[yellow]skipped[/]"}
@@ -30,11 +30,6 @@ def outcome_line(outcome: Any) -> str:
     took = f"  {outcome.seconds:.0f} s" if outcome.state != "skipped" else ""
     why = f"  {escape(outcome.reason)}" if outcome.reason else ""
     return f"{_ENDS[outcome.state]}  [bold]{escape(outcome.name)}[/]{took}{why}"
-
-
-def again_line(name: str, words: str) -> str:
-    """One line about kept numbers that are not used, with rich's markup."""
-    return f"seeds {escape(name)}: {escape(words)}"
 
 
 def pass_line(jobs: Sequence[Job]) -> str:
@@ -50,7 +45,7 @@ def pass_line(jobs: Sequence[Job]) -> str:
 
 @contextmanager
 def shown(console: Console) -> Iterator[Callable[[str, str, Any], None]]:
-    """Yields the listener for `wildlab.runner.processes.scheduling.run_jobs`."""
+    """Yields the listener for `wildlab.runner.scheduling.run_jobs`."""
     if not console.is_terminal:
         yield _in_lines(console)
         return
@@ -76,8 +71,6 @@ def shown(console: Console) -> Iterator[Callable[[str, str, Any], None]]:
             progress.update(task, completed=tally.completed, total=tally.total, description=tally.now())
             if event == "end":
                 progress.console.print(outcome_line(what), highlight=False, soft_wrap=True)
-            elif event == "again":
-                progress.console.print(again_line(name, what), highlight=False, soft_wrap=True)
 
         yield tell
 
@@ -97,7 +90,7 @@ class Tally:
         return sum(self.seeds.values()) + sum(self.cells.values())
 
     def note(self, name: str, event: str, what: Any) -> None:
-        """One event: see `wildlab.runner.processes.scheduling.Listener`."""
+        """One event: see `wildlab.runner.scheduling.Listener`."""
         if event == "plan":
             self.total = what
         elif event == "start":
@@ -139,8 +132,6 @@ def _in_lines(console: Console) -> Callable[[str, str, Any], None]:
             done, count = what
             if 4 * done // count > 4 * (done - 1) // count:
                 say(f"seeds {escape(name)}: {done} of {count}")
-        elif event == "again":
-            say(again_line(name, what))
         elif event == "note":
             say(f"note  {escape(name)}: {escape(what)}")
         elif event == "end":

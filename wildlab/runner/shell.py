@@ -48,7 +48,7 @@ class ShellEngine(Engine):  # type: ignore[misc]
         before_cell: Callable[[nbformat.NotebookNode, int], None],
         **_: Any,
     ) -> None:
-        outputs = _Outputs()
+        outputs: list[Any] = []
         shell = _shell(outputs)
         try:
             _run_cells(shell, outputs, nb_man, before_cell)
@@ -126,7 +126,7 @@ def execute_notebook(
 
 def _run_cells(
     shell: InteractiveShell,
-    outputs: _Outputs,
+    outputs: list[Any],
     nb_man: NotebookExecutionManager,
     before_cell: Callable[[nbformat.NotebookNode, int], None],
 ) -> None:
@@ -136,7 +136,8 @@ def _run_cells(
         if cell.cell_type == "code":
             with _streams_into(outputs):
                 result = shell.run_cell(cell.source, store_history=True)
-            cell.outputs, cell.execution_count = outputs.take(), shell.execution_count - 1
+            cell.outputs, cell.execution_count = outputs[:], shell.execution_count - 1
+            outputs.clear()
             # What fails to show itself is an error, though the cell goes on.
             if not result.success or any(one.output_type == "error" for one in cell.outputs):
                 nb_man.cell_exception(cell, cell_index=index)
@@ -145,70 +146,12 @@ def _run_cells(
             return
 
 
-class _Outputs:
-    """What the cell that runs has left so far, and what earlier ones have left under a name."""
-
-    def __init__(self) -> None:
-        self._nodes: list[Any] = []
-        self._named: dict[str, list[Any]] = {}
-        self._clear_before_next = False
-
-    def add(self, node: Any, name: str | None = None) -> None:
-        if self._clear_before_next:
-            self.clear()
-        self._nodes.append(node)
-        if name is not None:
-            self._named.setdefault(name, []).append(node)
-
-    def write(self, stream: str, text: str) -> None:
-        """Text written to one stream in one go is one output; it is put together by `take`."""
-        last = self._nodes[-1] if self._nodes and not self._clear_before_next else None
-        if last is not None and last.output_type == "stream" and last.name == stream:
-            last.text.append(text)
-        elif text:
-            self.add(nbformat.v4.new_output("stream", name=stream, text=[text]))
-
-    def update(self, name: str, data: dict[str, Any], metadata: dict[str, Any]) -> None:
-        """Put something else where what has that name was shown."""
-        for node in self._named.get(name, []):
-            node.data, node.metadata = data, metadata
-
-    def clear(self, wait: bool = False) -> None:
-        self._clear_before_next = wait
-        if not wait:
-            self._nodes.clear()
-
-    def take(self) -> list[Any]:
-        """All of them, and begin anew for the next cell."""
-        found, self._nodes, self._clear_before_next = self._nodes, [], False
-        for node in found:
-            if node.output_type == "stream":
-                node.text = "".join(node.text)
-        return found
-
-
-def _shell(outputs: _Outputs) -> InteractiveShell:
+def _shell(outputs: list[Any]) -> InteractiveShell:
     """A new shell whose ``outputs`` are what is shown and raised."""
 
     class Publisher(DisplayPublisher):
-        def publish(
-            self,
-            data: Any,
-            metadata: Any = None,
-            *_: Any,
-            transient: Any = None,
-            update: bool = False,
-            **__: Any,
-        ) -> None:
-            shown, name = _plain(data), (transient or {}).get("display_id")
-            if update and name is not None:
-                outputs.update(name, shown, metadata or {})
-            else:
-                node = nbformat.v4.new_output("display_data", data=shown, metadata=metadata or {})
-                outputs.add(node, name)
-
-        def clear_output(self, wait: bool = False) -> None:
-            outputs.clear(wait)
+        def publish(self, data: Any, metadata: Any = None, *_: Any, **__: Any) -> None:
+            outputs.append(nbformat.v4.new_output("display_data", data=_plain(data), metadata=metadata or {}))
 
     class Hook(DisplayHook):
         def write_output_prompt(self) -> None:
@@ -218,7 +161,7 @@ def _shell(outputs: _Outputs) -> InteractiveShell:
             """Nor an empty line."""
 
         def write_format_data(self, format_dict: Any, md_dict: Any = None) -> None:
-            outputs.add(
+            outputs.append(
                 nbformat.v4.new_output(
                     "execute_result",
                     data=_plain(format_dict),
@@ -229,7 +172,7 @@ def _shell(outputs: _Outputs) -> InteractiveShell:
 
     class Shell(InteractiveShell):
         def _showtraceback(self, etype: Any, evalue: Any, stb: list[str]) -> None:
-            outputs.add(
+            outputs.append(
                 nbformat.v4.new_output("error", ename=etype.__name__, evalue=str(evalue), traceback=stb)
             )
 
@@ -247,21 +190,25 @@ def _plain(data: dict[str, Any]) -> dict[str, Any]:
 
 
 class _Stream(io.TextIOBase):
-    """Text that is written becomes outputs."""
+    """Text that is written becomes outputs; what goes to one stream in one go is one."""
 
-    def __init__(self, name: str, outputs: _Outputs) -> None:
+    def __init__(self, name: str, outputs: list[Any]) -> None:
         self.name, self.outputs = name, outputs
 
     def writable(self) -> bool:
         return True
 
     def write(self, text: str) -> int:
-        self.outputs.write(self.name, text)
+        last = self.outputs[-1] if self.outputs else None
+        if last is not None and last.output_type == "stream" and last.name == self.name:
+            last.text += text
+        elif text:
+            self.outputs.append(nbformat.v4.new_output("stream", name=self.name, text=text))
         return len(text)
 
 
 @contextlib.contextmanager
-def _streams_into(outputs: _Outputs) -> Iterator[None]:
+def _streams_into(outputs: list[Any]) -> Iterator[None]:
     stdout, stderr = _Stream("stdout", outputs), _Stream("stderr", outputs)
     with contextlib.redirect_stdout(stdout), contextlib.redirect_stderr(stderr):
         yield

@@ -29,8 +29,8 @@ from wildlab.reporting.notebook_pages import (
     write_notebook,
 )
 from wildlab.reporting.text import failure_page
-from wildlab.runner.record.digests import seal
 from wildlab.runner.seeds import SeedWork
+from wildlab.runner.status import seal
 
 
 @dataclass(frozen=True)

@@ -16,12 +16,11 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
-from wildlab.runner.processes.cluster import Cluster
-from wildlab.runner.processes.ending import end_tree, start_process
-from wildlab.runner.processes.job import Failure, Job, clear, install, leave_failure, log_of, sweep
-from wildlab.runner.processes.notebook_process import run_notebook
-from wildlab.runner.processes.worker_pool import WorkerPool
-from wildlab.runner.seeds import damaged_line, failed_seeds, missing_seeds, set_aside, sweep_seeds
+from wildlab.runner.job import Failure, Job, clear, install, leave_failure, log_of, sweep
+from wildlab.runner.notebook_process import run_notebook
+from wildlab.runner.processes import end_tree, start_process
+from wildlab.runner.seeds import failed_seeds, missing_seeds, sweep_seeds
+from wildlab.runner.worker_pool import Cluster, WorkerPool
 
 
 @dataclass(frozen=True)
@@ -36,7 +35,7 @@ class Outcome:
 
 
 #: Called with (name, event, what). First of all ("", "plan", how many seeds and cells there are to do); then
-#: for each study "start" None, "seeds" (to compute, all), "again" text (which kept numbers are not used),
+#: for each study "start" None, "seeds" (to compute, all),
 #: "seed" (done, to compute), "note" text, "stage" (text,), "cell" (index, count), "end" Outcome.
 Listener = Callable[[str, str, Any], None]
 
@@ -51,8 +50,6 @@ class _Waiting:
     under_way: int = 0
     count: int = 0
     failures: list[tuple[int, Failure]] = field(default_factory=list)
-    #: Seeds whose kept numbers were damaged.
-    damaged: list[int] = field(default_factory=list)
     started: float | None = None
     began: str = ""
 
@@ -67,8 +64,6 @@ class _Waiting:
             tell(self.job.name, "start", None)
             if self.job.seeds is not None:
                 tell(self.job.name, "seeds", (self.count, len(self.job.seeds.seeds)))
-            if self.damaged:
-                tell(self.job.name, "again", damaged_line(self.damaged))
 
 
 def run_jobs(
@@ -108,8 +103,8 @@ def run_jobs(
 def _waiting(job: Job) -> _Waiting:
     if job.seeds is None:
         return _Waiting(job, deque())
-    damaged, missing = set_aside(job.seeds), missing_seeds(job.seeds)
-    return _Waiting(job, deque(missing), count=len(missing), damaged=damaged)
+    missing = missing_seeds(job.seeds)
+    return _Waiting(job, deque(missing), count=len(missing))
 
 
 @dataclass

@@ -1,1 +1,0 @@
-"""Processes: jobs, their schedule, workers and notebooks, what is shown meanwhile, and their outputs."""
