@@ -47,10 +47,8 @@ def test_a_map_is_laid_under_a_flight_and_its_points_lie_on_it(surveyed, tmp_pat
     flight = load_flight(folder)
     assert flight.terrain is not None and flight.manifest.terrain is not None
     assert flight.manifest.terrain.crs == "EPSG:25833"
-    out = succeed("georeference", folder, "--out", tmp_path / "slope.csv")
+    succeed("georeference", folder, "--out", tmp_path / "slope.csv")
     level, slope = pd.read_csv(tmp_path / "level.csv"), pd.read_csv(tmp_path / "slope.csv")
-    shift = np.hypot(slope["north_m"] - level["north_m"], slope["east_m"] - level["east_m"])
-    assert f"{shift.median():.2f} m" in out and f"{shift.max():.2f} m" in out
     # On the slope, convergence of the grid aside: it leans to the east.
     rise = -(slope["down_m"] - level["down_m"])
     np.testing.assert_allclose(rise, 0.1 * slope["east_m"], atol=0.1)

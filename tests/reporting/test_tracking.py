@@ -120,7 +120,7 @@ def test_every_track_is_in_the_denominator():
     other = rows().iloc[:1].assign(sensor="lidar")
     both = pd.concat([rows(), rows(target="u", nees=50.0, verdict="overconfident"), lost, other])
     first = page.answer(both, [])[0]
-    assert first.key == "errors-mixed" and (first.values["n"], first.values["judged"]) == ("4", "3")
+    assert first.key == "errors-mixed" and (first.values["n"], first.values["judged"]) == (4, 3)
     assert page.reason(both).values["counts"] == "1 consistent, 2 overconfident, 1 not judged"
 
 

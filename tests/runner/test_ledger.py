@@ -107,8 +107,6 @@ def test_published_files_that_are_wrong_are_named(tmp_path, old, new, sentence):
     ("entry", "sentence"),
     [
         ('[Bad]\ntitle = "a"\nnotebook = "a.ipynb"', "Bad"),
-        ('[a]\ntitle = "a"\nnotebook = "../a.ipynb"', "folder"),
-        ('[a]\ntitle = "a"\nnotebook = "a.ipynb"\ntwin = "t"\nrecipe = "r.toml"', "twin or"),
         ('[a]\ntitle = "a"\nnotebook = "a.ipynb"\nparameters = {seed = 2}', "'seed'"),
         ("[a", "read"),
     ],

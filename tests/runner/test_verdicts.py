@@ -77,16 +77,14 @@ source = "H table 1"
 def test_a_mean_whose_sign_nobody_defines_is_held_against_sizes(tmp_path):
     entries = [
         metrics.metric("mae", "kf", 9.4, "m", low=5, high=14),
-        metrics.metric("mean_north", "kf", 0.1, "m", low=-5, high=5, below=0.1),
-        metrics.metric(
-            "size_of_mean_north", "kf", 3.0, "m", low=0.2, high=5, below=0.8, flights=99, power=0.1
-        ),
+        metrics.metric("mean_north", "kf", 0.1, "m", low=-5, high=5),
+        metrics.metric("size_of_mean_north", "kf", 3.0, "m", low=0.2, high=5, flights=99, power=0.1),
     ]
     folder = published(tmp_path / "published", SIGNED)
     ran(tmp_path, *entries)
     one = study_status(a_study(), tmp_path, folder)
     number = one.numbers[1]
-    assert (number.published, number.here, number.low, number.below) == (4.1, 3.0, 0.2, 0.8)
+    assert (number.published, number.here, number.low) == (4.1, 3.0, 0.2)
     assert number.answers == ("not judged", "no power")
     ran(tmp_path, entries[0], metrics.metric("mean_north", "kf", -4.0, "m"))
     assert study_status(a_study(), tmp_path, folder).numbers[1].here == 4.0

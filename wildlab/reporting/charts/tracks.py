@@ -357,7 +357,7 @@ def error_map(scored: pd.DataFrame, images: Sequence[object]) -> Figure:
     Parameters
     ----------
     scored
-        From `wildlab.analysis.evaluate.score_points`.
+        From `wildlab.analysis.georeference.score_points`.
     images
         Ids of frames, of which the first is number 1.
     """
