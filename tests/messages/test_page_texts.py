@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from wildlab.errors import WildlabError
 from wildlab.messages.catalogue import FOLDER, fill, load_texts
 from wildlab.messages.quantities import measure, percent_of, significant
 
@@ -44,10 +45,19 @@ def test_numbers_and_values_are_put_in_once():
     assert fill("{flights}, {factor}, {share:percent}, {n}", MAE, values) == "{ekf/mae}, 3.0, 94 %, 1234"
 
 
-@pytest.mark.parametrize("text", ["{ekf/nees}", "{kf/mae}", "{nothing}", "{ekf/mae:metres}"])
-def test_a_number_that_was_never_recorded_is_a_fault(text):
-    with pytest.raises(KeyError):
+@pytest.mark.parametrize(
+    ("text", "error"),
+    [("{ekf/nees}", WildlabError), ("{kf/mae}", WildlabError), ("{no}", KeyError), ("{ekf/mae:m}", KeyError)],
+)
+def test_a_number_that_was_never_recorded_is_a_fault(text, error):
+    with pytest.raises(error):
         fill(text, MAE, {})
+
+
+def test_a_text_that_is_not_there_is_named_with_its_file():
+    with pytest.raises(WildlabError) as found:
+        load_texts("schmidt").figures["nothing"]
+    assert found.value.field == "figure.nothing" and "schmidt.toml" in str(found.value)
 
 
 @pytest.mark.parametrize("page", PAGES)

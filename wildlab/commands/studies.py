@@ -52,13 +52,14 @@ def list_(reports: Path, as_json: bool, rule: bool) -> None:
     rows = []
     for one in statuses:
         done, data = one.state == "done", one.study.dataset
-        holding = sum(claim.verdict == HOLDS for claim in one.claims)
+        theirs = [claim for claim in one.claims if not claim.own]
+        holding = sum(claim.verdict == HOLDS for claim in theirs)
         # What has not been run has neither come out nor failed to.
         printed = len(one.counted)
         found = tally(one.counted)
         close = f"{found.close['close']} of {printed}" if done else f"{printed} published"
         within = found.within if done else ""
-        claims = f"{holding} of {len(one.claims)}" if done else f"{len(one.claims)} published"
+        claims = f"{holding} of {len(theirs)}" if done else f"{len(theirs)} published"
         first = f"; first: wildlab fetch {data}" if data and not done and not is_fetched(data) else ""
         unsealed = f" ({one.reason})" if one.ran and one.reason else ""
         state = f"{one.state}{unsealed}{first}"
@@ -69,7 +70,7 @@ def list_(reports: Path, as_json: bool, rule: bool) -> None:
                 state,
                 close if one.numbers else "-",
                 within if one.numbers else "-",
-                claims if one.claims else "-",
+                claims if theirs else "-",
                 one.study.title,
             ]
         )

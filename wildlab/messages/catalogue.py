@@ -178,6 +178,17 @@ class PageTexts(NamedTuple):
     tables: Mapping[str, TableText] = {}
 
 
+class OfPage(dict[str, Any]):
+    """Texts of a page by their keys; the error of one that is not there says where it should be."""
+
+    def __init__(self, path: Path, kind: str, texts: Mapping[str, Any]) -> None:
+        super().__init__(texts)
+        self.path, self.kind = path, kind
+
+    def __missing__(self, key: str) -> Any:
+        raise WildlabError("there is no such text", "write it", file=self.path, field=f"{self.kind}.{key}")
+
+
 @lru_cache
 def load_texts(page: str, folder: Path = FOLDER) -> PageTexts:
     """The texts of a page.
@@ -215,12 +226,14 @@ def load_texts(page: str, folder: Path = FOLDER) -> PageTexts:
             content.get("subtitle", ""),
             tuple(content.get("limits", ())),
             content.get("method", ""),
-            content.get("answer", {}),
+            OfPage(path, "answer", content.get("answer", {})),
             tuple(TileText(**one) for one in content.get("tile", ())),
             content.get("subject", {}),
             content.get("quantity", {}),
-            {key: FigureText(**one) for key, one in content.get("figure", {}).items()},
-            {key: TableText(**one) for key, one in content.get("table", {}).items()},
+            OfPage(
+                path, "figure", {key: FigureText(**one) for key, one in content.get("figure", {}).items()}
+            ),
+            OfPage(path, "table", {key: TableText(**one) for key, one in content.get("table", {}).items()}),
         )
     except TypeError as error:
         raise WildlabError(f"an entry has a key that is none ({error})", "mend it", file=path) from None
@@ -444,8 +457,10 @@ def fill(
 
     Raises
     ------
+    WildlabError
+        If nothing was recorded for a placeholder.
     KeyError
-        If nothing was recorded for a placeholder, or it asks for a form that there is not: a fault of ours.
+        If it asks for a value or a form that there is not: a fault of ours.
 
     Examples
     --------
@@ -457,6 +472,12 @@ def fill(
     def one(match: re.Match[str]) -> str:
         subject, name, form = match.groups()
         if subject is not None:
+            if (name, subject) not in recorded:
+                raise WildlabError(
+                    f"a text names {subject}/{name}, which was not recorded",
+                    "give it a unit in the study's rules, or mend the text",
+                    field=text[:60],
+                )
             return FORMS[form or "value"](recorded[name, subject])
         value = values[name]
         if isinstance(value, str | Integral):

@@ -275,7 +275,7 @@ def load_published(study: str, folder: Path = FOLDER) -> pd.DataFrame:
     Parameters
     ----------
     study
-        Name of the case.
+        Its name in ``studies.toml``.
     folder
         That holds the files; left out, ``data/published``.
 
@@ -366,7 +366,7 @@ def load_claims(study: str, folder: Path = FOLDER) -> list[dict[str, Any]]:
     Parameters
     ----------
     study
-        Name of the case.
+        Its name in ``studies.toml``.
     folder
         As for `load_published`.
 

@@ -170,9 +170,7 @@ def find_study(name: str, studies: dict[str, StudyEntry]) -> StudyEntry:
     alike = [known for known in studies if name and name in known]
     near = alike or difflib.get_close_matches(name, studies, n=1)
     words = " or ".join(repr(known) for known in near)
-    raise WildlabError(
-        f"there is no study {name!r}", f"did you mean {words}?" if near else "see: wildlab list"
-    )
+    raise WildlabError(f"there is no study {name!r}", f"use {words}" if near else "see: wildlab list")
 
 
 def check_notebook(notebook: Path, parameters: Sequence[str]) -> int:

@@ -173,7 +173,7 @@ def decide_claims(
         if claim["id"] not in checks:
             raise WildlabError(
                 f"nothing was computed for the claim {claim['id']!r}",
-                "give it a check, or take it out of data/published",
+                "give it a check whose numbers every flight has, or take it out of data/published",
                 field=report.study,
             )
         check = checks[claim["id"]]
