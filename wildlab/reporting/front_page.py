@@ -452,7 +452,7 @@ def front_page(
     )
     made = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC") + (f", {code}" if code else "")
     style = read_style("front")
-    footer = f"<p>{made}. No part of this page asks the network for anything.</p>"
+    footer = f"<p>{made}. This page works offline.</p>"
     return page(title="wildlab", body=body, kicker="wildlab", footer=footer, style=style)
 
 
