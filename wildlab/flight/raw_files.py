@@ -338,6 +338,10 @@ class RawTable:
             raise self.fail(problem if isinstance(problem, str) else problem(row), fix, column, part, row)
 
 
+#: Of a table that is no text: its file, columns, where each row stands, and what that counts.
+_Cells = tuple[Path, dict[str, Any], NDArray[np.int64], str]
+
+
 @dataclass
 class RawFiles:
     """The files below a source folder that a recipe has asked for, each read and hashed once."""
@@ -384,50 +388,41 @@ class RawFiles:
             Where it cannot be read, is not UTF-8, is empty, or a row has more or fewer cells than the first;
             or where it is no MATLAB file or log of that format, or does not hold what the recipe says.
         """
-        if name in self.logs:
-            return self._log_table(name)
-        if name in self.matlab:
-            return self._matlab_table(name)
-        key = name, separator, decimal
+        stated = self._of_log if name in self.logs else self._of_matlab if name in self.matlab else None
+        key = (name,) if stated else (name, separator, decimal)
         if key not in self._tables:
-            data = self.read(name, part)
-            header, cells, lines = read_delimited(
-                self.folder / name, data, separator, may_be_empty=may_be_empty
-            )
-            table = RawTable(self.folder / name, header, cells, lines, decimal=decimal)
+            if stated is not None:
+                path, cells, rows, counted_in = stated(name)
+                self._tables[key] = RawTable(path, tuple(cells), cells, rows, counted_in)
+                return self._tables[key]
+            path = self.folder / name
+            found = read_delimited(path, self.read(name, part), separator, may_be_empty=may_be_empty)
+            table = RawTable(path, *found, decimal=decimal)
             if not len(table):
                 return table  # kept, it would pass where rows are asked for
             self._tables[key] = table
         return self._tables[key]
 
-    def _matlab_table(self, name: str) -> RawTable:
+    def _of_matlab(self, name: str) -> _Cells:
         block, part = self.matlab[name], f"tables.{name}"
-        if (name, "") not in self._tables:
-            path = self.folder / block.file
-            if block.file not in self._variables:
-                self._variables[block.file] = read_matlab(path, self.read(block.file, part))
-            cells = table_of(self._variables[block.file], block, path, part)
-            count = len(next(iter(cells.values())))
-            self._tables[name, ""] = RawTable(path, tuple(cells), cells, np.arange(1, count + 1), "row")
-        return self._tables[name, ""]
+        path = self.folder / block.file
+        if block.file not in self._variables:
+            self._variables[block.file] = read_matlab(path, self.read(block.file, part))
+        cells = table_of(self._variables[block.file], block, path, part)
+        return path, cells, np.arange(1, len(next(iter(cells.values()))) + 1), "row"
 
-    def _log_table(self, name: str) -> RawTable:
+    def _of_log(self, name: str) -> _Cells:
         block = self.logs[name]
-        if (name, "") not in self._tables:
-            path = self.folder / block.file
-            if block.format == "autoferry":
-                data = self.read(block.file, f"logs.{name}")
-                cells, frames = read_part(path, data, cast(Part, block.part))
-                self._tables[name, ""] = RawTable(path, tuple(cells), cells, frames, "frame")
-            else:
-                stream = log_part(self._log(block, f"logs.{name}"), block, path)
-                if block.triggers is not None:
-                    stream = stamped_by(stream, self._other(block.triggers, f"{name}.triggers", False), path)
-                if block.images is not None:
-                    stream = of_images(stream, self._other(block.images, f"{name}.images", True))
-                cells = stream.columns
-                self._tables[name, ""] = RawTable(path, tuple(cells), cells, stream.rows, stream.counted_in)
-        return self._tables[name, ""]
+        path = self.folder / block.file
+        if block.format == "autoferry":
+            cells, frames = read_part(path, self.read(block.file, f"logs.{name}"), cast(Part, block.part))
+            return path, cells, frames, "frame"
+        stream = log_part(self._log(block, f"logs.{name}"), block, path)
+        if block.triggers is not None:
+            stream = stamped_by(stream, self._other(block.triggers, f"{name}.triggers", False), path)
+        if block.images is not None:
+            stream = of_images(stream, self._other(block.images, f"{name}.images", True))
+        return path, stream.columns, stream.rows, stream.counted_in
 
     def _other(self, name: str, asked: str, photos: bool) -> Stream:
         """Another log of the recipe: triggers that images have their times from, or the images of pixels."""
@@ -437,7 +432,7 @@ class RawFiles:
             fix = did_you_mean(name, self.logs)
             raise WildlabError(problem, fix, file=self.recipe, field=f"logs.{asked}")
         if photos:
-            table = self._log_table(name)
+            table = self.table(name, "", asked)
             return Stream(table.cells, table.lines, table.counted_in)
         return log_part(self._log(other, f"logs.{name}"), other, self.folder / other.file)
 
