@@ -13,10 +13,10 @@ from tests.sound_logs import VELOCITY as SPEED
 from wildlab.files import sha256
 from wildlab.flight.catalog import read_catalog
 from wildlab.flight.checks.check import check_flight, usable_for
-from wildlab.flight.checks.inertial import FORCE, RATE
 from wildlab.flight.checks.inertial import samples as inertial_samples
 from wildlab.flight.clocks import gnss_times
 from wildlab.flight.importing import import_flight
+from wildlab.flight.schema import FORCE, RATE
 from wildlab.flight.store import Flight, load_flight
 from wildlab.paths import DATA
 

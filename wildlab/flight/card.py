@@ -40,6 +40,7 @@ from wildlab.flight.heights import NO_GRID, HeightPlan, HeightUse, choose_refere
 from wildlab.flight.importing import import_flight
 from wildlab.flight.manifest import CameraPart, TerrainSays
 from wildlab.flight.readers.log import PARTS, Stream
+from wildlab.flight.schema import QUATERNION
 from wildlab.flight.store import Flight
 from wildlab.paths import DATA
 
@@ -619,10 +620,9 @@ def angles(stream: Stream) -> str:
 
 
 def attitude(stream: Stream) -> dict[str, Any]:
-    parts = ("q_w", "q_x", "q_y", "q_z")
-    turned = _together(stream, parts)
+    turned = _together(stream, QUATERNION)
     if turned is not None and np.isfinite(turned[:, 0]).all():
-        return {"quaternion": parts, "order": "wxyz"}
+        return {"quaternion": QUATERNION, "order": "wxyz"}
     return quantities(TURNS, "{}" + (angles(stream) or "_deg"), "deg")
 
 

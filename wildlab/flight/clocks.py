@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.schema import COVARIANCE_COLUMNS
+from wildlab.flight.schema import COVARIANCE_COLUMNS, POSITION, QUATERNION
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import quaternion_to_matrix
 from wildlab.geometry.turns import between_attitudes
@@ -117,8 +117,8 @@ def poses_at(
     WildlabError
         Where the log's stamps do not increase, or neither times nor frame names fit the log.
     """
-    position = nav[["north_m", "east_m", "down_m"]].to_numpy(float)
-    attitude = nav[["q_w", "q_x", "q_y", "q_z"]].to_numpy(float)
+    position = nav[POSITION].to_numpy(float)
+    attitude = nav[QUATERNION].to_numpy(float)
     covariance = covariances(nav)
     if len(nav) == 0:
         raise WildlabError("the table is empty", "give it rows", file="nav")
@@ -174,8 +174,8 @@ def pose_finder(
         p, R, _ = poses_at(nav, None, frame_ids)
         return lambda _: (p, R)
     stamps = nav["time_s"].to_numpy(float)
-    position = nav[["north_m", "east_m", "down_m"]].to_numpy(float)
-    attitude = np.ascontiguousarray(nav[["q_w", "q_x", "q_y", "q_z"]].to_numpy(float))
+    position = nav[POSITION].to_numpy(float)
+    attitude = np.ascontiguousarray(nav[QUATERNION].to_numpy(float))
     longest = _longest(stamps, "nav")
 
     def find(times: ArrayLike) -> tuple[Array, Array]:
@@ -317,7 +317,7 @@ def truth_at(truth: pd.DataFrame, times: ArrayLike, offset_s: float = 0.0) -> tu
     at = np.atleast_1d(np.asarray(times, float))
     # By arrays: this is asked for thousands of times, and pandas' groups cost more than all else of it.
     codes, names = pd.factorize(truth["target_id"].to_numpy(object))
-    position = truth[["north_m", "east_m", "down_m"]].to_numpy(float)
+    position = truth[POSITION].to_numpy(float)
     stamps = truth["time_s"].to_numpy(float) + offset_s
     where = np.empty((len(names), len(at), 3))
     for k, name in enumerate(names):

@@ -42,6 +42,7 @@ from wildlab.flight.recipe_tables import (
     read_truth,
 )
 from wildlab.flight.recipes import Recipe, read_recipe
+from wildlab.flight.schema import POSITION
 from wildlab.flight.store import Flight, save_flight
 from wildlab.flight.terrain import lay_terrain
 
@@ -256,7 +257,7 @@ def _positions_of_receiver(
         raise ValueError("poses without positions")
     gnss = tables["gnss"]
     stamps = gnss["time_s"].to_numpy() + recipe.clocks.gnss_offset_s - recipe.gnss.latency_s
-    return between(stamps, gnss[["north_m", "east_m", "down_m"]].to_numpy(), times, "gnss")
+    return between(stamps, gnss[POSITION].to_numpy(), times, "gnss")
 
 
 def _epoch(recipe: Recipe, stamps: list[Any]) -> datetime | None:

@@ -10,7 +10,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from wildlab.flight.checks.findings import NORM_TOLERANCE, POSITION, QUATERNION, VELOCITY
+from wildlab.flight.checks.findings import (
+    NORM_TOLERANCE,
+)
 from wildlab.flight.clocks import covariance_columns
 from wildlab.flight.raw_files import (
     Array,
@@ -41,7 +43,7 @@ from wildlab.flight.recipes import (
     Velocity,
     YawFromBearing,
 )
-from wildlab.flight.schema import Dimension
+from wildlab.flight.schema import POSITION, QUATERNION, VELOCITY, Dimension
 from wildlab.geometry.attitude_uncertainty import pose_covariance, tilt_from_roll_pitch
 from wildlab.geometry.frames import (
     R_NED_ENU,

@@ -42,6 +42,14 @@ SECOND_COLUMNS = ("second_north_m", "second_east_m", "second_down_m")
 #: From b to the (first) antenna and to the second one, in b: x ahead, y right, z down.
 LEVER_COLUMNS = tuple(f"{which}lever_{axis}_m" for which in ("", "second_") for axis in "xyz")
 
+#: Names of columns that go together, in all tables.
+POSITION = ["north_m", "east_m", "down_m"]
+VELOCITY = ["v_north_m_s", "v_east_m_s", "v_down_m_s"]
+QUATERNION = ["q_w", "q_x", "q_y", "q_z"]
+FORCE = ["f_x_m_s2", "f_y_m_s2", "f_z_m_s2"]
+RATE = ["w_x_rad_s", "w_y_rad_s", "w_z_rad_s"]
+FIELD = ["field_x_ut", "field_y_ut", "field_z_ut"]
+
 Bounds = tuple[float, float]
 
 

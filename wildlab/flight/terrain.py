@@ -21,6 +21,7 @@ from wildlab.errors import WildlabError
 from wildlab.flight.heights import undulation
 from wildlab.flight.manifest import TerrainPart, TerrainSays, replace_in_manifest
 from wildlab.flight.readers.terrain import ElevationMap, Heights, open_elevation
+from wildlab.flight.schema import POSITION
 from wildlab.flight.store import MOST_NODES, Flight
 from wildlab.geometry.frames import Origin, geodetic_to_ned, ned_to_geodetic
 from wildlab.geometry.terrain import Terrain
@@ -351,9 +352,8 @@ def _cut_out(places: MapPlaces, positions: Array, margin: float, says: TerrainSa
 
 def _positions(flight: Flight) -> tuple[Array, NDArray[np.bool_]]:
     """Where the flight and what it saw were, (N, 3) m, and which of these are poses."""
-    names = ["north_m", "east_m", "down_m"]
-    poses = [table[names].to_numpy(float) for table in flight.nav.values()]
-    truth = [] if flight.truth is None else [flight.truth[names].to_numpy(float)]
+    poses = [table[POSITION].to_numpy(float) for table in flight.nav.values()]
+    truth = [] if flight.truth is None else [flight.truth[POSITION].to_numpy(float)]
     every = np.concatenate([*poses, *truth, np.zeros((0, 3))])
     is_pose = np.arange(len(every)) < sum(map(len, poses))
     known = np.isfinite(every).all(axis=1)

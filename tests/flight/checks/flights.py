@@ -11,8 +11,8 @@ import pandas as pd
 from tests.flight.checks.watching import level_poses, watch
 from tests.flight.conftest import MANIFEST
 from tests.sound_logs import NED, QUATERNION, VELOCITY
-from wildlab.flight.checks.inertial import FORCE, RATE
 from wildlab.flight.manifest import make_manifest
+from wildlab.flight.schema import FORCE, RATE
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array, matrix_to_quaternion
 from wildlab.simulation import (

@@ -11,8 +11,8 @@ from tests.flight.checks.test_mistakes_named import shift
 from tests.sound_logs import NED
 from tests.sound_logs import VELOCITY as SPEED
 from wildlab.flight.checks.check import Finding, find, usable_for
-from wildlab.flight.checks.inertial import FORCE
 from wildlab.flight.manifest import replace_in_manifest
+from wildlab.flight.schema import FORCE
 from wildlab.flight.store import Flight
 
 

@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wildlab.flight.checks.attitude import follows, headed, heading
-from wildlab.flight.checks.findings import POSITION, QUATERNION
-from wildlab.flight.checks.inertial import FLYING, FORCE, RATE, Inertial, samples, why_no_start
+from wildlab.flight.checks.inertial import FLYING, Inertial, samples, why_no_start
 from wildlab.flight.manifest import MountPart
+from wildlab.flight.schema import FORCE, POSITION, QUATERNION, RATE
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import euler_to_matrix, matrix_to_quaternion
 

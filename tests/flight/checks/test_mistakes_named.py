@@ -21,7 +21,7 @@ from tests.sound_flights import simulate_sound_flight
 from tests.sound_logs import NED, VELOCITY
 from wildlab.flight.checks.check import find
 from wildlab.flight.checks.findings import Correction, change_columns, state
-from wildlab.flight.checks.inertial import FORCE, RATE
+from wildlab.flight.schema import FORCE, RATE
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import geodetic_to_ned, ned_to_geodetic
 from wildlab.simulation import fixed_wing_trajectory

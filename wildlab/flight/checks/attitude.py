@@ -13,9 +13,6 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from wildlab.flight.checks.findings import (
-    POSITION,
-    QUATERNION,
-    VELOCITY,
     Change,
     Finding,
     Misfit,
@@ -41,8 +38,6 @@ from wildlab.flight.checks.findings import (
 )
 from wildlab.flight.checks.inertial import (
     FACTOR,
-    FORCE,
-    RATE,
     Inertial,
     airframe_sources,
     attitudes_near,
@@ -51,7 +46,7 @@ from wildlab.flight.checks.inertial import (
     moves,
     samples,
 )
-from wildlab.flight.schema import other_units
+from wildlab.flight.schema import FIELD, FORCE, POSITION, QUATERNION, RATE, VELOCITY, other_units
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array, matrix_to_euler, quaternion_to_matrix
 from wildlab.geometry.gravity import USUAL_GRAVITY
@@ -322,7 +317,6 @@ def _if_turning(change: Change) -> Callable[[Felt], Felt | None]:
 
 # -- the magnetic field against attitude, place and the usual length: it stands still in n
 
-FIELD = ("field_x_ut", "field_y_ut", "field_z_ut")
 #: Length of the Earth's field anywhere, with what is magnetic on board (uT).
 WEAK, STRONG = 10.0, 150.0
 #: Share of the field's turning that an attitude usually leaves unexplained (as a ratio of sizes), and how far

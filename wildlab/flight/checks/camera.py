@@ -10,7 +10,6 @@ import pandas as pd
 
 from wildlab.errors import WildlabError
 from wildlab.flight.checks.findings import (
-    POSITION,
     Finding,
     Level,
     Mistake,
@@ -27,7 +26,7 @@ from wildlab.flight.checks.findings import (
 from wildlab.flight.checks.known_points import MOST
 from wildlab.flight.clocks import frame_poses, frame_times, gimbal_angles, poses_at
 from wildlab.flight.manifest import CameraPart
-from wildlab.flight.schema import DETECTION_KINDS
+from wildlab.flight.schema import DETECTION_KINDS, POSITION
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.georeference import BELOW, georeference_pixels
@@ -270,7 +269,7 @@ def _known_points(flight: Flight, ground: Terrain) -> Iterator[Finding]:
     truth = flight.truth
     if truth is None:
         return
-    still = truth[truth["time_s"].isna()].drop_duplicates("target_id")[list(POSITION)].to_numpy(float)
+    still = truth[truth["time_s"].isna()].drop_duplicates("target_id")[POSITION].to_numpy(float)
     above = -still[:, 2] - ground.heights_at(still[:, :2])
     above = above[np.isfinite(above)]
     if len(above) < 3:

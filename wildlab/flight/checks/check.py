@@ -18,8 +18,6 @@ from wildlab.flight.checks.camera import ground, image, lens, terrain_findings
 from wildlab.flight.checks.findings import (
     NORM_TOLERANCE,
     POSE,
-    POSITION,
-    QUATERNION,
     Finding,
     Level,
     bad_rows,
@@ -44,7 +42,7 @@ from wildlab.flight.checks.sensors import scans, sensors, targets
 from wildlab.flight.clock_fitting import Span
 from wildlab.flight.clocks import covariances, frame_times, gnss_times, longest_gap
 from wildlab.flight.files import printable
-from wildlab.flight.schema import NAV, TABLES, Table, extra_columns
+from wildlab.flight.schema import NAV, POSITION, QUATERNION, TABLES, Table, extra_columns
 from wildlab.flight.store import Flight, locations_confirmed, manifest_changed
 from wildlab.geometry.frames import Array
 from wildlab.names import listed
@@ -302,7 +300,7 @@ def values(flight: Flight) -> Iterator[Finding]:
 def _pose_values(table: str, nav: pd.DataFrame) -> Iterator[Finding]:
     for column in POSE:
         yield from bad_rows(~np.isfinite(nav[column].to_numpy()), "problem", table, column, "pose-not-finite")
-    norm = np.linalg.norm(nav[list(QUATERNION)].to_numpy(), axis=1)
+    norm = np.linalg.norm(nav[QUATERNION].to_numpy(), axis=1)
     yield from bad_rows(
         np.abs(norm - 1) > NORM_TOLERANCE, "problem", table, "q_w", "not-normalised", {"norm": norm}
     )
@@ -383,7 +381,7 @@ def truth_place(flight: Flight) -> Iterator[Finding]:
     if flight.truth is None or not flight.nav:
         return
     poses = np.concatenate([finite_rows(nav, POSITION) for nav in flight.nav.values()])
-    truth = flight.truth[list(POSITION)].to_numpy()
+    truth = flight.truth[POSITION].to_numpy()
     if len(poses) == 0 or len(truth) == 0:
         return
     low, high = poses.min(axis=0)[:2], poses.max(axis=0)[:2]

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.flight.manifest import replace_in_manifest
-from wildlab.flight.schema import UNITS
+from wildlab.flight.schema import POSITION, QUATERNION, UNITS
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import (
     R_NED_ENU,
@@ -42,10 +42,7 @@ Level = Literal["problem", "warning", "note"]
 #: Logs print quaternions with few digits: four leave an error of 2e-4 in the norm.
 NORM_TOLERANCE = 1e-3
 
-POSITION = ("north_m", "east_m", "down_m")
-QUATERNION = ("q_w", "q_x", "q_y", "q_z")
-VELOCITY = ("v_north_m_s", "v_east_m_s", "v_down_m_s")
-POSE = ("time_s", *POSITION, *QUATERNION)
+POSE = ["time_s", *POSITION, *QUATERNION]
 
 
 @dataclass(frozen=True)

@@ -21,9 +21,6 @@ from scipy.spatial.transform import Rotation
 
 from wildlab.flight.checks.findings import (
     APART,
-    POSITION,
-    QUATERNION,
-    VELOCITY,
     Correction,
     Finding,
     Level,
@@ -34,13 +31,11 @@ from wildlab.flight.checks.findings import (
     shift_clock,
 )
 from wildlab.flight.clocks import gnss_times
-from wildlab.flight.schema import SECOND_COLUMNS
+from wildlab.flight.schema import FORCE, POSITION, QUATERNION, RATE, SECOND_COLUMNS, VELOCITY
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
 from wildlab.geometry.gravity import USUAL_GRAVITY
 
-FORCE = tuple(f"f_{axis}_m_s2" for axis in "xyz")
-RATE = tuple(f"w_{axis}_rad_s" for axis in "xyz")
 AXES = "xyz"
 
 #: Intervals are this long or a little longer, where the log's own rate allows: shorter ones are all noise.
@@ -168,11 +163,11 @@ def moves(table: pd.DataFrame | None) -> Moves | None:
     times = table["time_s"].to_numpy(float)
     measured = VELOCITY[0] in table
     if measured:
-        velocity = table[list(VELOCITY)].to_numpy(float)
+        velocity = table[VELOCITY].to_numpy(float)
         good = np.isfinite(velocity).all(axis=1)
         times, velocity = times[good], velocity[good]
     else:
-        velocity = np.diff(table[list(POSITION)].to_numpy(float), axis=0) / np.diff(times)[:, None]
+        velocity = np.diff(table[POSITION].to_numpy(float), axis=0) / np.diff(times)[:, None]
         times = (times[1:] + times[:-1]) / 2
     first, last = intervals(times)
     if len(first) == 0:
@@ -193,7 +188,7 @@ def airframe_sources(flight: Flight) -> list[str]:
     along_x = mount.looks == "forward" and mount.pan_deg == mount.tilt_deg == 0 and flight.gimbal is None
 
     def of_camera(name: str) -> bool:
-        w, x, y, z = flight.nav[name][list(QUATERNION)].to_numpy(float).T
+        w, x, y, z = flight.nav[name][QUATERNION].to_numpy(float).T
         steep = len(w) > 0 and np.nanmedian(2 * (x * z - w * y)) > STEEP
         return along_x and (steep or (name == mount.poses and len(logs) > 1))
 
@@ -205,7 +200,7 @@ def attitudes_near(nav: pd.DataFrame, times: Array) -> tuple[NDArray[np.intp], A
     stamps = nav["time_s"].to_numpy(float)
     after = np.clip(np.searchsorted(stamps, times), 1, len(stamps) - 1)
     nearest = np.where(times - stamps[after - 1] < stamps[after] - times, after - 1, after)
-    q = nav[list(QUATERNION)].to_numpy(float)[nearest]
+    q = nav[QUATERNION].to_numpy(float)[nearest]
     near = (np.abs(stamps[nearest] - times) < NEAREST_S) & np.isfinite(q).all(axis=1)
     near &= np.abs(q).sum(axis=1) > 0.5
     rows = np.flatnonzero(near)
@@ -259,11 +254,11 @@ def why_no_start(flight: Flight) -> str:
     if set(SECOND_COLUMNS) <= set(gnss.columns):
         return ""
     t, samples = gnss_times(flight), flight.table("imu")["time_s"].to_numpy(float)
-    names = list(VELOCITY[:2])
+    names = VELOCITY[:2]
     if set(names) <= set(gnss.columns):
         v = gnss[names].to_numpy(float)
     else:
-        v = np.gradient(gnss[list(POSITION[:2])].to_numpy(float), t, axis=0)
+        v = np.gradient(gnss[POSITION[:2]].to_numpy(float), t, axis=0)
     speed = np.hypot(v[:, 0], v[:, 1])
     speed = speed[(t >= samples[0]) & (t < samples[-1]) & np.isfinite(speed)]
     if not len(speed):

@@ -19,7 +19,6 @@ from wildlab.flight.checks.findings import (
     FAR_BETTER,
     MOST_NAMED,
     POSE,
-    POSITION,
     Change,
     Finding,
     Misfit,
@@ -44,6 +43,7 @@ from wildlab.flight.checks.findings import (
     undo_in,
 )
 from wildlab.flight.clocks import between, frame_times, gimbal_angles, poses_at, truth_at
+from wildlab.flight.schema import POSITION
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera, normalise
 from wildlab.geometry.frames import Array, Origin, euler_to_matrix, matrix_to_euler

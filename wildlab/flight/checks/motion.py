@@ -20,8 +20,6 @@ from wildlab.errors import WildlabError
 from wildlab.flight.checks.findings import (
     LEAP,
     POSE,
-    POSITION,
-    VELOCITY,
     Finding,
     Level,
     Misfit,
@@ -47,6 +45,7 @@ from wildlab.flight.checks.findings import (
 from wildlab.flight.checks.inertial import fixes, increasing_rows, intervals
 from wildlab.flight.checks.known_points import LONGEST_LEVER, best_of
 from wildlab.flight.clocks import poses_at
+from wildlab.flight.schema import POSITION, VELOCITY
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array, Origin, geodetic_to_ned, ned_to_geodetic
 
@@ -206,8 +205,8 @@ def pair_of(flight: Flight, source: str) -> PositionPair | None:
     if table is None or "frame_id" in nav or len(nav) < 2:
         return None
     table = table.iloc[thin(len(table), MOST_FIXES)]
-    t, p = table["time_s"].to_numpy(float), table[list(POSITION)].to_numpy(float)
-    brief = nav[list(POSE)]
+    t, p = table["time_s"].to_numpy(float), table[POSITION].to_numpy(float)
+    brief = nav[POSE]
 
     def at(shift: float) -> tuple[Array, Array]:
         return poses_at(brief, t + shift)[:2]
@@ -388,7 +387,7 @@ def without_leaps(flight: Flight) -> tuple[Flight, list[Leap]]:
     def smooth(table: pd.DataFrame, name: str) -> pd.DataFrame:
         found = find_leaps(table, name)
         every.extend(found)
-        place = table[list(POSITION)].to_numpy(float)
+        place = table[POSITION].to_numpy(float)
         for one in found:
             place = np.where(table["time_s"].to_numpy(float)[:, None] >= one.time_s, place - one.by, place)
         return table.assign(**dict(zip(POSITION, place.T, strict=True))) if found else table

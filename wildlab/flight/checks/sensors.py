@@ -17,7 +17,6 @@ from wildlab.errors import WildlabError
 from wildlab.flight.checks.findings import (
     ALIKE,
     FAR_BETTER_ALONE,
-    POSITION,
     Finding,
     Level,
     Misfit,
@@ -35,6 +34,7 @@ from wildlab.flight.checks.findings import (
 )
 from wildlab.flight.clocks import frame_times, poses_at, truth_at
 from wildlab.flight.manifest import Settings, absent_sensors
+from wildlab.flight.schema import POSITION
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array, wrap
 from wildlab.names import listed
@@ -189,7 +189,7 @@ def scans_of(flight: Flight) -> Scans:
         found.append(
             SourceLooks(
                 str(source),
-                rows[list(POSITION)].to_numpy(float) if position else None,
+                rows[POSITION].to_numpy(float) if position else None,
                 None if position else rows["azimuth_rad"].to_numpy(float),
                 own,
                 targets,

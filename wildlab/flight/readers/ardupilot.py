@@ -26,11 +26,8 @@ from wildlab.flight.clock_fitting import ClockFit, fit_steady, week_to_utc
 from wildlab.flight.readers.log import (
     ANGLES,
     CUT_OFF,
-    FIELD,
     FIX_PLANE,
     FIX_SPACE,
-    IMU,
-    VELOCITY,
     WORLD,
     Array,
     Columns,
@@ -48,7 +45,7 @@ from wildlab.flight.readers.log import (
     usable,
 )
 from wildlab.flight.readers.text import plural, told
-from wildlab.flight.schema import BOUNDS
+from wildlab.flight.schema import BOUNDS, FIELD, FORCE, QUATERNION, RATE, VELOCITY
 
 Bytes = NDArray[np.uint8]
 Index = NDArray[np.int64]
@@ -742,7 +739,7 @@ def _poses(log: ArdupilotLog, place: PlaceTrack | None) -> Stream | None:
     Attitudes are those of messages ATT, else quaternions of XKQ or NKQ, else of AHR2.
     """
     euler = named(ANGLES, ("Roll", "Pitch", "Yaw"))
-    q = named(("q_w", "q_x", "q_y", "q_z"), ("Q1", "Q2", "Q3", "Q4"))
+    q = named(QUATERNION, ("Q1", "Q2", "Q3", "Q4"))
     filters = ("XKQ", "XKQ1", "NKQ", "NKQ1", "XKQ2", "NKQ2")
     ways = ((("ATT",), euler), (filters, q), (("AHR2", "AHRS"), euler))
     found = ((table, one) for names, one in ways if (table := log.first(names, *one.values())) is not None)
@@ -763,8 +760,8 @@ def _poses(log: ArdupilotLog, place: PlaceTrack | None) -> Stream | None:
 
 def _imu(log: ArdupilotLog) -> Stream | None:
     """Specific force and rates of turn of the first IMU; None where the log has none."""
-    f, w = (named(IMU[at : at + 3], (f"{start}{axis}" for axis in "XYZ"))
-            for at, start in ((0, "Acc"), (3, "Gyr")))  # fmt: skip
+    f, w = (named(names, (f"{start}{axis}" for axis in "XYZ"))
+            for names, start in ((FORCE, "Acc"), (RATE, "Gyr")))  # fmt: skip
     both = log.first(("IMU", "IMU2", "IMU3"), "GyrX", "AccX")
     force = both or log.first(("ACC", "ACC1", "ACC2", "ACC3"))
     table = both or log.first(("GYR", "GYR1", "GYR2", "GYR3"))

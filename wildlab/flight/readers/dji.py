@@ -30,7 +30,6 @@ from wildlab.flight.readers.log import (
     ANGLES,
     PLACE,
     UTC_OF_LOG,
-    VELOCITY,
     WORLD,
     Array,
     Mask,
@@ -50,6 +49,7 @@ from wildlab.flight.readers.text import (
     stamp_s,
     told,
 )
+from wildlab.flight.schema import VELOCITY
 
 #: What is said of a clock without a zone.
 NO_ZONE = "local time without a zone"

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from wildlab.flight.clock_fitting import GPS_START_S
 from wildlab.flight.clocks import between
 from wildlab.flight.readers.text import LATEST_S, decode, plural
-from wildlab.flight.schema import BOUNDS
+from wildlab.flight.schema import BOUNDS, FIELD, FORCE, QUATERNION, RATE, VELOCITY
 from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
 
 Array = NDArray[np.float64]
@@ -36,7 +36,6 @@ HEIGHTS = ("height_ellipsoid_m", "height_sea_m", "height_home_m", "undulation_m"
 #: Of the airframe; of the camera, against north and the horizon.
 ANGLES, WORLD = (tuple(f"{one}{end}_deg" for one in ("roll", "pitch", "yaw")) for end in ("", "_world"))
 PLACE = ("latitude_deg", "longitude_deg", *HEIGHTS)
-VELOCITY = ("v_north_m_s", "v_east_m_s", "v_down_m_s")
 _SPREADS = ("sd_horizontal_m", "sd_vertical_m", "sd_velocity_m_s")
 
 #: Parts of a log, and the columns that each may have beside `TIMES` and `MARKS`.
@@ -46,15 +45,15 @@ PARTS: dict[str, tuple[str, ...]] = {
     "poses": (
         *PLACE,
         *VELOCITY,
-        *(*ANGLES, "q_w", "q_x", "q_y", "q_z"),
+        *(*ANGLES, *QUATERNION),
         *("sd_horizontal_m", "sd_vertical_m", "sd_tilt_deg", "sd_heading_deg"),
     ),
     # Satellite positions, of the first receiver; `fix`: 0 none, 1 estimated, 2 plane, 3 in space, 4
     # differential, 5 float, 6 fixed.
     "gnss": (*PLACE, *VELOCITY, *_SPREADS, "satellites", "fix", "hdop"),
     # Forward, right, down; at rest and level f is (0, 0, -g).
-    "imu": ("f_x_m_s2", "f_y_m_s2", "f_z_m_s2", "w_x_rad_s", "w_y_rad_s", "w_z_rad_s"),
-    "magnetometer": tuple(f"field_{axis}_ut" for axis in "xyz"),
+    "imu": (*FORCE, *RATE),
+    "magnetometer": (*FIELD,),
     # Of the camera: how it is turned against north and the horizon (`..._world_...`: pitch -90 looks down),
     # or against the airframe (pan and tilt as `wildlab.geometry.mount` has them).
     "gimbal": (*WORLD, "pan_deg", "tilt_deg"),
@@ -520,8 +519,6 @@ def _reachable(time: Array, latitude: Array, longitude: Array, height: Array) ->
 FIX_PLANE, FIX_SPACE = 2, 3
 #: GIMBAL_DEVICE_FLAGS: yaw is held against north; it is given against the vehicle; it is given against north.
 YAW_LOCK, YAW_VEHICLE, YAW_NORTH = 16, 32, 64
-IMU = ("f_x_m_s2", "f_y_m_s2", "f_z_m_s2", "w_x_rad_s", "w_y_rad_s", "w_z_rad_s")
-FIELD = ("field_x_ut", "field_y_ut", "field_z_ut")
 #: Columns of a place on Earth -> fields of MAVLink and of its relatives.
 LAT_LON = {"latitude_deg": "lat", "longitude_deg": "lon lng"}
 

@@ -22,11 +22,8 @@ from wildlab.flight.files import printable
 from wildlab.flight.readers.log import (
     ANGLES,
     CUT_OFF,
-    FIELD,
     FIX_SPACE,
-    IMU,
     LAT_LON,
-    VELOCITY,
     WORLD,
     Array,
     Messages,
@@ -41,6 +38,7 @@ from wildlab.flight.readers.log import (
     named,
     wrapped,
 )
+from wildlab.flight.schema import FIELD, FORCE, QUATERNION, RATE, VELOCITY
 
 MAGIC = b"ULog\x01\x12\x35"
 #: Of each message before its content.
@@ -258,7 +256,7 @@ def _poses(log: Px4Log, notes: list[str]) -> Stream | None:
         q = q / np.linalg.norm(q, axis=1)[:, None]
     angles = euler_deg(attitude.quaternion(), 0.1)
     q[np.isnan(angles).any(axis=1)] = np.nan
-    columns |= named(("q_w", "q_x", "q_y", "q_z", *ANGLES), (*q.T, *angles.T))
+    columns |= named((*QUATERNION, *ANGLES), (*q.T, *angles.T))
     return log.readings(attitude, columns)
 
 
@@ -319,7 +317,7 @@ def _gnss(log: Px4Log) -> Stream:
 def _imu(log: Px4Log) -> Stream:
     found = log.first("sensor_combined")
     names = [f"{name}[{i}]" for name in ("accelerometer_m_s2", "gyro_rad") for i in range(3)]
-    return log.readings(found, found.columns(named(IMU, names)))
+    return log.readings(found, found.columns(named((*FORCE, *RATE), names)))
 
 
 def _magnetometer(log: Px4Log) -> Stream | None:

@@ -24,10 +24,7 @@ from wildlab.flight.clock_fitting import ClockFit, fit_steady
 from wildlab.flight.files import printable
 from wildlab.flight.readers.log import (
     ANGLES,
-    FIELD,
-    IMU,
     LAT_LON,
-    VELOCITY,
     WORLD,
     Array,
     Mask,
@@ -45,13 +42,14 @@ from wildlab.flight.readers.log import (
     wrapped,
 )
 from wildlab.flight.readers.text import told
+from wildlab.flight.schema import FIELD, FORCE, RATE, VELOCITY
+from wildlab.geometry.gravity import STANDARD_GRAVITY
 
 #: MAV_AUTOPILOT_INVALID and MAV_TYPE_GCS: what is no autopilot says so in its heartbeat.
 _NO_AUTOPILOT, _GROUND_STATION = 8, 6
 #: What vehicles are known by, best first.
 _FLIES = ("ATTITUDE", "GLOBAL_POSITION_INT", "GPS_RAW_INT")
 _FIRMWARE = re.compile(r"^(Ardu\w+|APM:?\w*|PX4|AntennaTracker|Blimp)\b.*\d")
-STANDARD_GRAVITY = 9.80665
 #: In units of g: what a device at rest and in flight feels in the middle, whatever it is called raw.
 _FELT = (0.5, 2.0)
 #: Values that mean "not known" in 8 and 16 bits.
@@ -458,7 +456,7 @@ def _inertial(vehicle: Vehicle, notes: list[str]) -> dict[str, Stream | None]:
         felt = float(np.median(np.linalg.norm(force, axis=0))) / STANDARD_GRAVITY
         parts: dict[str, Stream | None] = {}
         if _FELT[0] < felt < _FELT[1]:
-            parts["imu"] = vehicle.readings(found, stamp, named(IMU, (*force, *rate)))
+            parts["imu"] = vehicle.readings(found, stamp, named((*FORCE, *RATE), (*force, *rate)))
         else:
             notes.append(f"{name} is left out: its median is {felt:.3g} g, so its units are not known")
         if (field != 0).any():

@@ -36,7 +36,6 @@ from wildlab.flight.clock_fitting import GPS_START_S, WEEK_S, gps_to_utc, week_t
 from wildlab.flight.readers import text
 from wildlab.flight.readers.log import (
     UTC_OF_LOG,
-    VELOCITY,
     Array,
     Mask,
     RawLog,
@@ -46,6 +45,7 @@ from wildlab.flight.readers.log import (
     named,
 )
 from wildlab.flight.readers.text import number, numbers, parse_xml, plural, stamp_s, told
+from wildlab.flight.schema import VELOCITY
 from wildlab.geometry.attitude_uncertainty import tilt_from_roll_pitch
 
 # -- NMEA 0183
