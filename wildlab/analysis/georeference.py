@@ -140,35 +140,42 @@ def observe(
             file=flight.folder,
             field="detections",
         )
-    name, nav = flight.pose_source(source)
+    name, _ = flight.pose_source(source)
     at = flight.frame_rows(pixels["frame_id"])
     own_clock = frames[stamps].to_numpy(float) - frames["time_s"].to_numpy(float)
     times = (frame_times(flight) + own_clock + clock_shift)[at]
-    p_nb, R_nb, covariance = poses_at(nav, times, pixels["frame_id"])
-    pan, tilt = (angle[at] for angle in gimbal_angles(flight))
-    lost = at < 0
-    p_nb[lost], R_nb[lost] = np.nan, np.nan
     table = pd.DataFrame(
         {
             "detection_id": pixels["detection_id"],
             "frame_id": pixels["frame_id"],
             "group": frames["group"].to_numpy()[at] if "group" in frames else "",
             "target_id": pixels["target_id"].fillna("") if "target_id" in pixels else "",
-            "time_s": np.where(lost, np.nan, times),
+            "time_s": np.where(at < 0, np.nan, times),
         }
     )
-    manifest = flight.manifest
-    mount = manifest.geometry_mount(name)
     seen = Observations(
         flight,
         name,
         table,
         pixels[["u_px", "v_px"]].to_numpy(float),
-        CameraPoses(manifest.geometry_camera(), mount, p_nb, R_nb, pan, tilt, covariance),
+        camera_poses(flight, name, times, at),
         _ground_heights(flight, table, pixels),
         flight.terrain,
     )
     return _grounded(seen)
+
+
+def camera_poses(flight: Flight, source: str, times: Array, rows: Indices) -> CameraPoses:
+    """The camera's poses at the images in rows (N,) of the frames, at times (N,) s by the log's clock.
+
+    NaN where the log has none, and for a row of -1. A pose that belongs to an image by name is its own.
+    """
+    name, nav = flight.pose_source(source)
+    p_nb, R_nb, covariance = poses_at(nav, times, flight.table("frames")["frame_id"].iloc[rows])
+    pan, tilt = (angle[rows] for angle in gimbal_angles(flight))
+    p_nb[rows < 0], R_nb[rows < 0] = np.nan, np.nan
+    m = flight.manifest
+    return CameraPoses(m.geometry_camera(), m.geometry_mount(name), p_nb, R_nb, pan, tilt, covariance)
 
 
 def camera_poses_at(flight: Flight, times: Array, source: str | None = None) -> CameraPoses:

@@ -14,13 +14,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.analysis.georeference import observe, truth_of
+from wildlab.analysis.georeference import camera_poses, observe, truth_of
 from wildlab.errors import WildlabError
 from wildlab.evaluation.streams import FINE, HARMFUL, Pace, pace_of, runs_of, vibration_of
 from wildlab.flight.checks.check import Finding, Use, find, usable_for
 from wildlab.flight.clocks import frame_poses, frame_times, gimbal_angles, gnss_times, longest_gap
 from wildlab.flight.store import Flight
-from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, Mask, matrix_to_euler, quaternion_to_matrix
 from wildlab.geometry.georeference import georeference_pixels, pixel_rays
 from wildlab.geometry.terrain import pixels_to_terrain
@@ -115,20 +114,19 @@ def cover_images(flight: Flight, source: str | None) -> Coverage | None:
     -------
     Coverage or None
     """
-    frames, manifest = flight.frames, flight.manifest
-    if frames is None or not len(frames) or source is None or manifest.camera is None:
+    frames = flight.frames
+    if frames is None or not len(frames) or source is None or flight.manifest.camera is None:
         return None
     level = (0.0, "the flight's terrain") if flight.terrain is not None else ground_height(flight)
     if level is None:
         return None
     try:
-        p, R, _ = frame_poses(flight, source)
-        pan, tilt = gimbal_angles(flight)
-        mount = manifest.geometry_mount(source)
+        poses = camera_poses(flight, source, frame_times(flight), np.arange(len(frames)))
     except WildlabError:
         return None
-    posed = np.isfinite(p).all(axis=1) & np.isfinite(R).all(axis=(1, 2)) & np.isfinite(pan + tilt)
-    poses = CameraPoses(manifest.geometry_camera(), mount, p[posed], R[posed], pan[posed], tilt[posed])
+    known = np.isfinite(poses.p_nc).all(axis=1) & np.isfinite(poses.R_nc).all(axis=(1, 2))
+    posed = np.asarray(known)
+    poses = poses.take(posed)
     uv = _border(poses.camera.width, poses.camera.height)
     outlines = np.full((len(frames), len(uv), 2), np.nan)
     flat = np.zeros(len(frames), bool)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.analysis.georeference import observe
+from wildlab.analysis.georeference import camera_poses, observe
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import (
     autocorrelation,
@@ -25,7 +25,7 @@ from wildlab.evaluation.consistency import (
     share_inside,
 )
 from wildlab.evaluation.errors import summarise_track, track_errors
-from wildlab.flight.clocks import frame_times, gimbal_angles, poses_at, truth_at
+from wildlab.flight.clocks import frame_times, truth_at
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
@@ -140,21 +140,15 @@ def read_pixels(flight: Flight, source: str, target: str | None = None) -> Pixel
             f"no detection names the target {name!r}", f"choose one of {', '.join(names)}", field="target"
         )
     seen = seen.take((seen.table["target_id"] == name).to_numpy())
-    frames = flight.table("frames")
     stamps = frame_times(flight)
     order = np.argsort(stamps, kind="stable")
     place = np.empty(len(order), int)
     place[order] = np.arange(len(order))
     row = place[flight.frame_rows(seen.table["frame_id"])]
     first, last = int(row.min()), int(row.max()) + 1
-    times, ids = stamps[order][first:last], frames["frame_id"].iloc[order[first:last]]
-    poses_name, nav = flight.pose_source(source)
-    p_nb, R_nb, covariance = poses_at(nav, times, ids)
-    pan, tilt = (angle[order][first:last] for angle in gimbal_angles(flight))
-    manifest = flight.manifest
-    poses = CameraPoses(
-        manifest.geometry_camera(), manifest.geometry_mount(poses_name), p_nb, R_nb, pan, tilt, covariance
-    )
+    taken = order[first:last]
+    times = stamps[taken]
+    poses = camera_poses(flight, source, times, taken)
     uv = np.full((len(times), 2), np.nan)
     # Over terrain a ray that meets no ground is no measurement: its plane would be invented.
     met = np.isfinite(seen.plane_down) if seen.terrain is not None else np.ones(len(row), bool)
