@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 from wildlab.errors import WildlabError
+from wildlab.flight.files import dump_toml
 from wildlab.reporting.published import load_claims
 from wildlab.runner.catalogue import load_studies
 from wildlab.studies.page import Facts
@@ -35,6 +36,31 @@ def test_rules_are_arithmetic_on_numbers():
 def test_nothing_else_is_worked_out(rule):
     with pytest.raises(WildlabError, match="cannot be worked out"):
         Rules({"x": np.ones(2)}.get, {})(rule)
+
+
+@pytest.mark.parametrize(
+    ("given", "named"),
+    [
+        ({"a": "a + 1"}, "a names a"),
+        ({"a": "1", "b": "c", "c": "b"}, "b names c"),
+        ({"a": "1 +"}, "a is no rule"),
+        ({"a": "-" * 1000 + "1"}, "given.a"),
+        ({f"a{k}": f"a{k - 1} + 1" if k else 1 for k in range(1000)}, "50"),
+    ],
+)
+def test_names_that_never_end_are_refused_by_file_and_name(tmp_path, monkeypatch, given, named):
+    path = tmp_path / "endless.toml"
+    path.write_text(dump_toml({"given": given}))
+    monkeypatch.setattr("wildlab.studies.FOLDERS", [tmp_path])
+    with pytest.raises(WildlabError, match=named) as refused:
+        load_rules("endless")
+    assert refused.value.file == str(path) and str(refused.value.field).startswith("given")
+
+
+def test_a_name_is_worked_out_once():
+    asked = []
+    given = {"a0": "'x'"} | {f"a{k}": f"a{k - 1} + a{k - 1}" for k in range(1, 49)}
+    assert Rules(lambda key: asked.append(key) or 1.0, given)("a48") == 2.0**48 and asked == ["x"]
 
 
 def test_of_several_pairs_the_closest_is_shown():

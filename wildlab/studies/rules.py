@@ -18,25 +18,26 @@
     "accuracy-*" = "outcome('kf-more-accurate')"
     accuracy-unclear = ""
 
-A rule is arithmetic, comparisons, ``and``, ``or`` and ``not`` on numbers, on names of ``[given]``, and on
-recorded numbers, ``'subject/name'``; with ``*`` in it these are all that fit, one below the other. It is
-written as in Python and worked out here node by node: whatever is no such thing is refused, and nothing runs.
-`FUNCTIONS` says which there are, and `facts_functions` which an answer has besides.
+A rule is arithmetic, comparisons, ``and``, ``or`` and ``not`` on numbers, on names of ``[given]`` that stand
+above it, and on recorded numbers, ``'subject/name'``; with ``*`` in it these are all that fit, one below the
+other. It is written as in Python and worked out here node by node: whatever is no such thing is refused, and
+nothing runs. `FUNCTIONS` says which there are, and `facts_functions` which an answer has besides.
 """
 
 from __future__ import annotations
 
 import ast
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from functools import lru_cache, reduce
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import chi_square_interval, white_bound
@@ -91,7 +92,8 @@ FUNCTIONS: Mapping[str, Callable[..., Any]] = {
 }
 
 
-class Rules(NamedTuple):
+@dataclass(frozen=True)
+class Rules:
     """What works out rules.
 
     Attributes
@@ -106,7 +108,8 @@ class Rules(NamedTuple):
 
     number: Callable[[str], Any]
     given: Mapping[str, float | str]
-    functions: Mapping[str, Callable[..., Any]] = {}
+    functions: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
+    _known: dict[str, Any] = field(default_factory=dict)
 
     def __call__(self, rule: float | str) -> Any:
         """The value of a rule.
@@ -137,7 +140,9 @@ class Rules(NamedTuple):
             case ast.Constant(value=int() | float() as value):
                 return float(value)
             case ast.Name(id=name) if name in self.given:
-                return self(self.given[name])
+                if name not in self._known:
+                    self._known[name] = self(self.given[name])
+                return self._known[name]
             case ast.UnaryOp(op=op, operand=one) if type(op) in _OPERATORS:
                 return _OPERATORS[type(op)](self._of(one))
             case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
@@ -162,6 +167,10 @@ def _parsed(rule: str) -> ast.AST:
     return ast.parse(rule, mode="eval").body
 
 
+#: A rule as a file may have it: none is longer than a line.
+Rule = Annotated[str, Field(max_length=400)]
+
+
 class CheckRule(Strict):
     """What the flights give for a claim, by rules; see `wildlab.evaluation.shares.Check`.
 
@@ -171,17 +180,17 @@ class CheckRule(Strict):
     something is so, and of how many: of several pairs the one with the largest share.
     """
 
-    true: str | None = None
-    measured: str | None = None
+    true: Rule | None = None
+    measured: Rule | None = None
     above: bool = False
-    premise: str | None = None
-    larger: list[str] | list[list[str]] | None = None
-    smaller: list[str] | None = None
-    between: list[str] | None = None
+    premise: Rule | None = None
+    larger: list[Rule] | list[list[Rule]] | None = None
+    smaller: list[Rule] | None = None
+    between: list[Rule] | None = None
     unit: str = ""
-    pooled: list[list[str]] | None = None
+    pooled: list[list[Rule]] | None = None
     calculated: bool = False
-    by_threshold: dict[str, str] | None = None
+    by_threshold: dict[str, Rule] | None = None
     reach: list[float | str] = Field(default=["-inf", "inf"], min_length=2, max_length=2)
 
 
@@ -189,9 +198,25 @@ class StudyRules(Strict):
     """``data/studies/<case>.toml``."""
 
     unit: dict[str, str] = Field(default_factory=dict)
-    given: dict[str, float | str] = Field(default_factory=dict)
+    given: dict[str, float | Rule] = Field(default_factory=dict, max_length=50)
     check: dict[str, CheckRule] = Field(default_factory=dict)
-    answer: list[dict[str, str]] = Field(default_factory=list)
+    answer: list[dict[str, Rule]] = Field(default_factory=list)
+
+    @field_validator("given")
+    @classmethod
+    def _in_order(cls, given: dict[str, float | str]) -> dict[str, float | str]:
+        """Refuse a rule that names itself or what stands below it: it could go round for ever."""
+        below = set(given)
+        for name, rule in given.items():
+            try:
+                nodes = [*ast.walk(_parsed(str(rule)))]
+            except (SyntaxError, RecursionError) as error:
+                raise ValueError(f"{name} is no rule ({error}); write it as Python's arithmetic") from error
+            late = [one.id for one in nodes if isinstance(one, ast.Name) and one.id in below]
+            if late:
+                raise ValueError(f"{name} names {late[0]}, which is not above it; move {late[0]} up")
+            below.remove(name)
+        return given
 
     def unit_of(self, name: str) -> str | None:
         """The unit of a number of the trial by the first name or pattern that fits; None: not recorded."""
