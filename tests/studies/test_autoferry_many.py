@@ -11,6 +11,7 @@ import pytest
 from wildlab.evaluation.identities import Moment, compare_identities
 from wildlab.flight.files import dump_toml
 from wildlab.flight.manifest import parse_settings
+from wildlab.reporting.report import open_report
 from wildlab.studies import autoferry_many
 from wildlab.studies.autoferry_many import Tuned, anees_of, draw, order
 
@@ -48,13 +49,26 @@ def test_what_it_was_tuned_on_is_in_no_median():
             for case, value in zip(("s1", "s2", "s3"), values, strict=True)
         ]
     )
-    middle = autoferry_many.medians(rows, "s1")
-    assert middle.set_index("mode")["gospa"].to_dict() == {"radar": 8.0, "lidar": 5.0, "both": 8.0}
+    spread = autoferry_many.over_scenarios(rows, "s1")
+    assert {mode: spread[f"elsewhere/{mode}", "gospa_median"].median() for mode in modes} == {
+        "radar": 8.0, "lidar": 5.0, "both": 8.0,
+    }  # fmt: skip
+    recorded = recorded_of(rows, "s1")
+    median = recorded["gospa_median", "elsewhere/radar"]
+    # Of two scenarios there is no confidence interval of a median: their range is shown.
+    assert [median[name] for name in ("value", "low", "high", "flights")] == [8.0, 7.0, 9.0, 2]
+    assert median["centre_low"] is None
     # One break in each of the two scenarios.
-    assert (middle["changes"] == 2).all() and (middle["of"] == 2).all()
-    assert autoferry_many.values(middle) == {"tracked": 90, "changes": 2}
-    alone = autoferry_many.values(autoferry_many.medians(rows[rows["case"] == "s1"], "s1"))
-    assert np.isnan(list(alone.values())).all()
+    assert recorded["track_changes", "elsewhere/both"]["value"] == 2
+    assert recorded["track_changes", "elsewhere/both"]["n"] == 2
+    alone = recorded_of(rows[rows["case"] == "s1"], "s1")
+    assert alone["tracked_median", "elsewhere/both"]["value"] is None
+
+
+def recorded_of(rows, first):
+    report = open_report(study="autoferry-many", flight="", kind="logged", seed=1, seeds=None, out="")
+    autoferry_many.record_scores(report, rows, first)
+    return report.recorded
 
 
 def test_draws_whose_tracks_are_as_wrong_as_they_say_go_first():

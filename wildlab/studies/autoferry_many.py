@@ -19,6 +19,7 @@ from wildlab.paths import DATA
 from wildlab.reporting.many_tracks import LARGEST, SMALLEST, rms_error
 from wildlab.reporting.report import Report
 from wildlab.studies.autoferry import tune_sensor
+from wildlab.studies.monte_carlo import record_spread
 
 #: The ways to look: by one sensor, by both, and with the cameras too.
 MODES: dict[str, tuple[str, ...]] = {
@@ -178,31 +179,37 @@ def judge_all(flights: Mapping[str, Flight], tuned: Mapping[str, Tuned]) -> pd.D
     )
 
 
-def medians(rows: pd.DataFrame, first: str) -> pd.DataFrame:
-    """For each mode, over the scenarios that nothing was tuned on.
+#: Medians over scenarios, by name: of which number of each, and its unit.
+MEDIANS = {"gospa_median": ("gospa", "m"), "tracked_median": ("tracked", "%")}
+
+
+def over_scenarios(rows: pd.DataFrame, first: str) -> pd.DataFrame:
+    """What each mode gives on each scenario but the first, on which everything was tuned.
 
     Returns
     -------
     DataFrame
-        ``mode``; medians of ``gospa`` and of how much boats are ``tracked`` (%); how many ``changes`` of a
-        boat's track there are in all; ``of`` how many scenarios.
+        Columns (``elsewhere/`` and the mode, a name of `MEDIANS`), a row for each scenario.
     """
-    elsewhere = rows[rows["case"] != first].dropna(subset=["gospa"])
-    found = [
+    by_mode = rows.pivot(index="case", columns="mode").drop(index=first)
+    return pd.DataFrame(
         {
-            "mode": mode,
-            "gospa": own["gospa"].median(),
-            "tracked": own["tracked"].median(),
-            "changes": own[["swaps", "breaks"]].to_numpy(float).sum(),
-            "of": len(own),
+            (f"elsewhere/{mode}", name): by_mode[column, mode]
+            for mode in rows["mode"].unique()
+            for name, (column, _) in MEDIANS.items()
         }
-        for mode, own in elsewhere.groupby("mode", sort=False)
-    ]
-    return pd.DataFrame(found, columns=["mode", "gospa", "tracked", "changes", "of"])
+    )
 
 
-def record_scores(report: Report, rows: pd.DataFrame, middle: pd.DataFrame) -> None:
-    """The numbers, for ``metrics.json``."""
+def record_scores(report: Report, rows: pd.DataFrame, first: str) -> dict[str, int]:
+    """Record the numbers of each scenario; and by mode, of all but the first, medians (`MEDIANS`) with the
+    lowest and the highest, and how often a boat's track changes.
+
+    Returns
+    -------
+    dict
+        These changes.
+    """
     each = (
         ("gospa", "gospa", "m"), ("rmse", "rmse", "m"), ("swaps", "swaps", "1"), ("breaks", "breaks", "1"),
         ("mean_nees_by_two", "anees", "1"),
@@ -210,19 +217,11 @@ def record_scores(report: Report, rows: pd.DataFrame, middle: pd.DataFrame) -> N
     for _, one in rows.iterrows():
         for name, column, unit in each:
             report.metric(name, f"{one['case']}/{one['mode']}", one[column], unit)
-    middles = (
-        ("gospa_median", "gospa", "m"),
-        ("tracked_median", "tracked", "%"),
-        ("track_changes", "changes", "1"),
-    )
-    for _, one in middle.iterrows():
-        for name, column, unit in middles:
-            report.metric(name, f"elsewhere/{one['mode']}", one[column], unit, n=int(one["of"]))
-
-
-def values(middle: pd.DataFrame) -> dict[str, float]:
-    """``tracked`` (%) and ``changes`` by lidar and radar for the page's answer; NaN where not known."""
-    both = middle[middle["mode"] == "both"]
-    found = {name: float(both[name].iloc[0]) if len(both) else np.nan for name in ("tracked", "changes")}
-    # Whole numbers are shown as such.
-    return {name: int(value) if value.is_integer() else value for name, value in found.items()}
+    units = {name: unit for name, (_, unit) in MEDIANS.items()}
+    record_spread(report, units.get, over_scenarios(rows, first), {})
+    changes = {}
+    for mode, own in rows.groupby("mode", sort=False):
+        seen = own.loc[own["case"] != first, ["swaps", "breaks"]].dropna()
+        changes[str(mode)] = int(seen.to_numpy().sum())
+        report.metric("track_changes", f"elsewhere/{mode}", changes[str(mode)], "1", n=len(seen))
+    return changes
