@@ -14,7 +14,9 @@ from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.mount import Mount
-from wildlab.simulation.scene import CameraResponse, Scene, Sea, expose, render, sensor_of, vessel
+from wildlab.simulation.scene.bodies import vessel
+from wildlab.simulation.scene.flights import CameraResponse, expose, sensor_of
+from wildlab.simulation.scene.render import Scene, Sea, render
 
 #: Images a second that are wanted of the search, and scenes a second of the rendering.
 SEARCHED, RENDERED = 250.0, 4.0

@@ -12,6 +12,7 @@ import pytest
 
 from wildlab.analysis.navigate import errors_against, navigate_mekf
 from wildlab.flight.store import Flight
+from wildlab.simulation.courses import twin_trajectory
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.manifest import twin_manifest
 from wildlab.simulation.onboard_sensors import (
@@ -23,7 +24,6 @@ from wildlab.simulation.onboard_sensors import (
 )
 from wildlab.simulation.parameters import TwinParameters, load_twin
 from wildlab.simulation.trajectory import Motion, angular_rates, attitude_along, turned
-from wildlab.simulation.twin_trajectory import twin_trajectory
 
 DURATION, SEEDS = 200.0, 20
 OUTAGE = (115.0, 175.0)

@@ -20,7 +20,7 @@ from wildlab.navigation.mekf import Outages, prepare, run_mekf
 from wildlab.navigation.noise import AxisErrors
 from wildlab.navigation.strapdown import ImuSamples
 from wildlab.simulation.error_models import gauss_markov
-from wildlab.simulation.imu import misaligned_triad
+from wildlab.simulation.onboard_sensors import misaligned_triad
 
 
 @pytest.fixture(scope="module")

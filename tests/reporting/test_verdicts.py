@@ -21,7 +21,7 @@ from wildlab.reporting.status import (
     OPEN,
     standing,
 )
-from wildlab.studies import monte_carlo
+from wildlab.studies import page
 
 
 def number(closeness: Closeness, compatibility: Compatibility, fitted: str = "") -> Comparison:
@@ -83,7 +83,7 @@ def test_metrics_follow_the_number_of_flights(n):
     values = FLIGHTS[:n]
     spread = pd.DataFrame({("kf", "mae"): values})
     report = open_report(study="linear-vs-nonlinear-fast", kind="twin")
-    monte_carlo.record_spread(report, lambda name: "m", spread, {})
+    page.record_spread(report, lambda name: "m", spread, {})
     (entry,) = report._metrics
     assert (entry["low"], entry["high"]) == (bounds_of(values) if n > 1 else (None, None))
     assert entry["value"] == values.median()

@@ -9,10 +9,10 @@ from wildlab.simulation.courses import (
     laps_path,
     loiter_path,
     shape_corners,
+    twin_trajectory,
 )
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.trajectory import band_limited_disturbance, fixed_wing_trajectory
-from wildlab.simulation.twin_trajectory import twin_trajectory
 
 WIND = np.array([4.0, -3.0, 0.0])
 LAPS_WIND = np.array([-3.2, -3.2, 0.0])  # 4.5 m/s from the north-east

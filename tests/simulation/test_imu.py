@@ -11,18 +11,21 @@ from tests.simulation.motions import restless_loiter
 from tests.simulation.test_twins import with_values
 from wildlab.flight.files import read_toml
 from wildlab.geometry.gravity import EARTH_RATE, Earth, normal_gravity
-from wildlab.simulation.imu import (
+from wildlab.simulation.courses import twin_trajectory
+from wildlab.simulation.onboard_sensors import (
     TriadDataSheet,
+    as_mounted,
     ideal_imu,
+    imu_table,
     misaligned_triad,
+    mounted_imu,
+    payload_boresight,
     read_imu,
     read_triad,
 )
-from wildlab.simulation.onboard_sensors import as_mounted, imu_table, mounted_imu, payload_boresight
 from wildlab.simulation.parameter_groups import Imu
 from wildlab.simulation.parameters import PARTS, TwinParameters, load_twin
 from wildlab.simulation.trajectory import Motion, angular_rates, attitude_along, specific_forces, turned
-from wildlab.simulation.twin_trajectory import twin_trajectory
 from wildlab.simulation.twins import simulate
 
 #: A triad that does not err; each test switches one error on.

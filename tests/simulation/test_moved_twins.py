@@ -9,11 +9,10 @@ import pytest
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
+from wildlab.simulation.courses import twin_trajectory
 from wildlab.simulation.landscape import ground_heights
-from wildlab.simulation.parameters import TwinParameters, load_twin, twin_names
-from wildlab.simulation.twin_trajectory import twin_trajectory
+from wildlab.simulation.parameters import TwinParameters, load_twin, scaled, twin_names, varied
 from wildlab.simulation.twins import OPTIONAL_TABLES, simulate
-from wildlab.simulation.variation import scaled, varied
 
 quick = partial(simulate, without=OPTIONAL_TABLES)
 MOVES = {

@@ -11,15 +11,18 @@ from wildlab.errors import WildlabError
 from wildlab.simulation.manifest import twin_manifest
 from wildlab.simulation.parameters import (
     PARTS,
+    TOLD,
     TWINS,
+    apply,
     each_parameter,
     fitted_to,
+    groups_of,
     load_twin,
     parameters_table,
     part_names,
     twin_names,
+    varied,
 )
-from wildlab.simulation.variation import TOLD, apply, groups_of, varied
 
 
 def complete(name: str) -> str:

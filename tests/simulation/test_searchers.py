@@ -9,13 +9,12 @@ from wildlab.geometry.frames import matrix_to_euler
 from wildlab.geometry.georeference import pixel_to_plane
 from wildlab.geometry.mount import Mount, camera_pose
 from wildlab.geometry.viewsheds import lines_clear
-from wildlab.simulation.courses import Laps, leg_headings, rows, survey_course
+from wildlab.simulation.courses import Laps, leg_headings, rows, survey_course, twin_trajectory
 from wildlab.simulation.landscape import twin_land
 from wildlab.simulation.onboard_sensors import gimbal_angles as true_angles
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.target_motion import animal_paths
 from wildlab.simulation.trajectory import attitude_along, specific_forces
-from wildlab.simulation.twin_trajectory import twin_trajectory
 from wildlab.simulation.twins import simulate, simulate_twin
 
 NAMES = ["uav-search-low", "uav-tracking", "gondola"]

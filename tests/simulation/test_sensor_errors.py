@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 from tests.simulation.motions import restless_loiter
 from tests.simulation.test_twins import with_values
 from wildlab.geometry.frames import matrix_to_rotation_vector
+from wildlab.simulation.courses import twin_trajectory
 from wildlab.simulation.error_models import (
     computer_stamps,
     gauss_markov,
@@ -23,7 +24,6 @@ from wildlab.simulation.trajectory import (
     camera_sway,
     recent_change,
 )
-from wildlab.simulation.twin_trajectory import twin_trajectory
 from wildlab.simulation.twins import OPTIONAL_TABLES, simulate
 
 

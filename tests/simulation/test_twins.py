@@ -18,10 +18,10 @@ from wildlab.geometry.frames import (
 )
 from wildlab.geometry.georeference import ground_to_pixel, pixel_to_plane
 from wildlab.geometry.mount import camera_pose
+from wildlab.simulation.courses import loiter_centre, twin_trajectory
 from wildlab.simulation.onboard_sensors import payload_boresight
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.trajectory import turned
-from wildlab.simulation.twin_trajectory import loiter_centre, twin_trajectory
 from wildlab.simulation.twins import OPTIONAL_TABLES, simulate, simulate_twin
 
 #: Most tests need no inertial readings, which take most of the time.

@@ -6,16 +6,9 @@ import numpy as np
 
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.mount import R_MC_DOWN
-from wildlab.simulation.scene import (
-    EVEN_LAND,
-    IDEAL,
-    LandScene,
-    Weather,
-    animal,
-    render_land,
-    sensor_of,
-)
-from wildlab.simulation.scene.response import expose, to_counts
+from wildlab.simulation.scene.drawn import animal
+from wildlab.simulation.scene.flights import IDEAL, expose, sensor_of, to_counts
+from wildlab.simulation.scene.land import EVEN_LAND, LandScene, Weather, render_land
 from wildlab.studies.wildlife_detection import (
     Picture,
 )

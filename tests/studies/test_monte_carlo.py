@@ -13,7 +13,7 @@ from wildlab.evaluation import share_interval
 from wildlab.evaluation.shares import UNDECIDABLE, Check
 from wildlab.reporting.published import judge
 from wildlab.reporting.report import Report, open_report
-from wildlab.studies import monte_carlo
+from wildlab.studies import page
 
 #: Published there: mean error 9.4, mean north -4.1, of a sign that is not defined.
 PUBLISHED = "schmidt-fast-vessel"
@@ -26,7 +26,7 @@ def report() -> Report:
 
 def recorded(report: Report, **columns: Any) -> pd.DataFrame:
     spread = pd.DataFrame({("ekf", name): np.asarray(values, float) for name, values in columns.items()})
-    monte_carlo.record_spread(report, lambda name: "m", spread, {})
+    page.record_spread(report, lambda name: "m", spread, {})
     return spread
 
 
@@ -59,7 +59,7 @@ def test_claims_are_decided_by_the_interval_of_their_share(report):
     flights = np.arange(50)
     true = {"always": flights >= 0, "never": flights < 0, "half": flights < 30}
     checks = {name: Check(true=one) for name, one in true.items()}
-    table = monte_carlo.decide_claims(report, claims, checks)
+    table = page.decide_claims(report, claims, checks)
     assert table["verdict"].tolist() == ["holds", "does not hold", "undecided"]
     assert table["share"].tolist()[2] == "30 of 50 (46 to 72 %)"
     assert [c["fraction"] for c in report.claims] == [1.0, 0.0, 0.6]
@@ -69,7 +69,7 @@ def test_claims_are_decided_by_the_interval_of_their_share(report):
 def test_a_threshold_is_shown_at_half_and_at_twice(report):
     claims = claims_of("a", threshold=2, reason="as far as one sees")
     measured = np.r_[np.full(50, 1.5), np.full(50, 3.0)]
-    (row,) = monte_carlo.decide_claims(report, claims, {"a": Check(measured=measured)}).to_dict("records")
+    (row,) = page.decide_claims(report, claims, {"a": Check(measured=measured)}).to_dict("records")
     assert row["verdict"] == "undecided"
     assert row["threshold"] == "at 1 does not hold, at 4 holds; taken: 2 (as far as one sees)"
     assert (report.claims[0]["half"], report.claims[0]["twice"]) == ("does not hold", "holds")
@@ -80,7 +80,7 @@ def test_a_threshold_that_the_measure_cannot_reach_is_left_out(report):
     f1 = np.full(50, 0.9)
 
     def row(check: Check) -> str:
-        (one,) = monte_carlo.decide_claims(report, claims, {"a": check}).to_dict("records")
+        (one,) = page.decide_claims(report, claims, {"a": check}).to_dict("records")
         return str(one["threshold"])
 
     assert row(Check(measured=f1, above=True)) == "at 0.35 holds, at 1.4 does not hold; taken: 0.7"
@@ -96,32 +96,32 @@ def test_a_premise_and_a_difference_are_said(report):
     met, true = np.arange(100) < 80, np.arange(100) < 40
     first, second = np.arange(100.0) % 7, np.zeros(100)
     check = Check(true=true, premise=met, first=first, second=second, unit="m")
-    (row,) = monte_carlo.decide_claims(report, claims, {"a": check}).to_dict("records")
+    (row,) = page.decide_claims(report, claims, {"a": check}).to_dict("records")
     assert row["share"].startswith("40 of 80 (") and row["share"].endswith("of 100 flights in all")
     assert row["premise"] == "Errors grow in turns: 80 of 100 flights" and "Ours" in row["claim"]
     assert row["difference"].startswith(f"{first.mean():.2f} (") and row["difference"].endswith("m")
     check = Check(true=true, premise=~met)
-    (row,) = monte_carlo.decide_claims(report, claims, {"a": check}).to_dict("records")
+    (row,) = page.decide_claims(report, claims, {"a": check}).to_dict("records")
     assert (row["verdict"], row["share"]) == ("premise not met", "20 of 100 flights meet the premise")
 
 
 def test_a_claim_without_a_check_is_named(report):
     claims = claims_of("a")
     with pytest.raises(WildlabError, match="claim 'a'"):
-        monte_carlo.decide_claims(report, claims, {})
+        page.decide_claims(report, claims, {})
 
 
 def test_shares_of_flights_are_pooled_by_their_images():
     spread = pd.DataFrame({("x", "images"): [10.0, 30.0, 5.0], ("x", "rate"): [1.0, 0.5, np.nan]})
-    share, images = monte_carlo.pooled_share(spread, "x", "rate")
+    share, images = page.pooled_share(spread, "x", "rate")
     assert images == 40 and share == share_interval(25, 40)
-    alarms = monte_carlo.pooled_share(spread * [1, 3], "x", "rate")[0]
+    alarms = page.pooled_share(spread * [1, 3], "x", "rate")[0]
     assert alarms.estimate == pytest.approx(75 / 40) and alarms.high == 1.0
-    assert monte_carlo.pooled_share(spread * [0, 1], "x", "rate")[1] == 0
+    assert page.pooled_share(spread * [0, 1], "x", "rate")[1] == 0
 
 
 def test_a_claim_that_needs_what_no_flight_has_cannot_be_decided(report):
     claims = claims_of("a", needs="recorded paths")
-    (row,) = monte_carlo.decide_claims(report, claims, {}).to_dict("records")
+    (row,) = page.decide_claims(report, claims, {}).to_dict("records")
     assert (row["verdict"], row["share"]) == (UNDECIDABLE, "needs recorded paths")
     assert report.claims[0]["verdict"] == UNDECIDABLE

@@ -11,7 +11,9 @@ from wildlab.evaluation.shares import FAILS, HOLDS, UNDECIDED, decide_check
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.mount import R_MC_DOWN
 from wildlab.reporting.published import load_claims, load_published
-from wildlab.simulation.scene import EVEN, IDEAL, Scene, expose, rectangle, render, sensor_of
+from wildlab.simulation.scene.bodies import rectangle
+from wildlab.simulation.scene.flights import IDEAL, expose, sensor_of
+from wildlab.simulation.scene.render import EVEN, Scene, render
 from wildlab.studies.rules import load_rules
 from wildlab.studies.vessel_detection import (
     BOATS,

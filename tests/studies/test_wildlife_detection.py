@@ -8,10 +8,7 @@ from tests.studies.animal_pictures import CAMERA
 from tests.studies.claims import checks_of, said
 from wildlab.detection.warm import Warm
 from wildlab.reporting.published import load_claims
-from wildlab.simulation.scene import (
-    CameraResponse,
-    sensor_of,
-)
+from wildlab.simulation.scene.flights import CameraResponse, sensor_of
 from wildlab.studies import wildlife_detection
 from wildlab.studies.wildlife_detection import (
     CLOUDY,

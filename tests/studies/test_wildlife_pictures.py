@@ -6,11 +6,8 @@ import numpy as np
 import pytest
 
 from tests.studies.animal_pictures import CAMERA, DARK, picture_of, rhino
-from wildlab.simulation.scene import (
-    IDEAL,
-    slab,
-    tree,
-)
+from wildlab.simulation.scene.drawn import slab, tree
+from wildlab.simulation.scene.flights import IDEAL
 from wildlab.studies import wildlife_detection
 from wildlab.studies.wildlife_detection import (
     CONSTANT,

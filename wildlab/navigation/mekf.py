@@ -32,7 +32,7 @@ from wildlab.navigation import kernels
 from wildlab.navigation.aiding import Aiding, gather, set_out
 from wildlab.navigation.kernels import Integers
 from wildlab.navigation.noise import AxisErrors
-from wildlab.navigation.noise import ImuNoise as ImuNoise  # part of what a run takes, so also found here
+from wildlab.navigation.noise import ImuNoise as ImuNoise
 from wildlab.navigation.strapdown import Gap, ImuSamples, Measurements, Timeline, checked_imu
 
 #: Verdicts on a measurement: left out by its gate; used; used after the covariance was widened.

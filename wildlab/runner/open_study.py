@@ -33,8 +33,7 @@ from wildlab.runner.seeds import (
     read_seed,
 )
 from wildlab.runner.worker_pool import compute_seeds
-from wildlab.studies.monte_carlo import record_spread
-from wildlab.studies.page import Shown, show_page, show_twins
+from wildlab.studies.page import Shown, record_spread, show_page, show_twins
 from wildlab.studies.protocol import Study, find_case, split_keys
 
 

@@ -1,6 +1,6 @@
 """`wildlab vary`: which verdicts of a study turn when the parameters that were chosen for its twin are moved.
 
-Each group of chosen or fitted parameters (`wildlab.simulation.variation.groups_of`) is multiplied by each
+Each group of chosen or fitted parameters (`wildlab.simulation.parameters.groups_of`) is multiplied by each
 factor, the filters' tuning stays what it is, and the study's trial is computed on the same seeds. Verdicts of
 these flights stand beside those of as many flights of the twin as it is.
 """
@@ -33,8 +33,8 @@ from wildlab.runner.seeds import (
 )
 from wildlab.runner.worker_pool import compute_seeds
 from wildlab.simulation import load_twin
-from wildlab.simulation.variation import groups_of
-from wildlab.studies.monte_carlo import decide_claims, record_spread
+from wildlab.simulation.parameters import groups_of
+from wildlab.studies.page import decide_claims, record_spread
 from wildlab.studies.protocol import VARIED, Study, split_keys
 
 #: Where tables are kept among the reports.

@@ -10,12 +10,12 @@ seed and the sensor's name.
 Where a change belongs:
 
 - parameters: `parameters` (a twin's file) with `parameter_groups`, whose values are quantities with units;
-- motion: `trajectory`, with attitudes and disturbances, along `courses`; what a twin flies is in
-  `twin_trajectory`, what it looks for in `target_motion`, and the ground in `landscape`;
-- sensors: `imu`, receivers and gimbal in `onboard_sensors`, and the `error_models` that they share; what they
-  are rather than what is said of them: `perturbed_flight`;
+- motion: `trajectory`, with attitudes and disturbances, along `courses`; what a twin looks for is in
+  `target_motion`, and the ground in `landscape`;
+- sensors: `onboard_sensors`, and the `error_models` that they share; what is said of them, and what they are:
+  `manifest`;
 - speed: `kernels`, compiled;
-- tables: `camera_detections`, `manifest`;
+- tables: `camera_detections`;
 - the whole flight: `twins`; what its camera would have seen, as images with labels: `scene`.
 """
 

@@ -1,22 +1,34 @@
-"""What `flight.toml` of a twin says."""
+"""What `flight.toml` of a twin says, and what the flight's sensors really are: drawn about it within stated
+tolerances.
+
+Data sheets, calibrations and levels are not exact, and nobody who flies knows by how much. So each flight
+(seed) has its own noise, biases, camera and mount; its manifest and its tables state the sheet, which is all
+that a filter or a georeferencing may know. What was drawn is written nowhere. Who judges an estimate may ask
+`as_flown` for it again.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
+import numpy as np
+
+from wildlab.flight.files import Strict
 from wildlab.flight.manifest import Manifest, make_manifest
 from wildlab.geometry.mount import Mount, helgesen_misalignment
+from wildlab.simulation.error_models import stream
 from wildlab.simulation.landscape import land_record
-from wildlab.simulation.parameter_groups import Gnss, Imu, TwinMount
+from wildlab.simulation.parameter_groups import Gnss, Imu, Parameter, TwinMount
 from wildlab.simulation.parameters import TwinParameters
 
 
 def twin_manifest(twin: TwinParameters, seed: int) -> Manifest:
     """What `flight.toml` of the twin says: its sensors' sheets and what one would assume, not the truth.
 
-    The truth of a flight is drawn about it (`wildlab.simulation.perturbed_flight`). Of a twin as flown,
+    The truth of a flight is drawn about it (`wildlab.simulation.manifest`). Of a twin as flown,
     camera and mount are the real ones.
     """
     c, m, assumed = twin.camera, twin.mount, twin.assumed
@@ -118,3 +130,105 @@ def _gnss(gnss: Gnss) -> dict[str, Any]:
     }
     known = {name: value for name, value in correlated.items() if value > 0}
     return {"name": gnss.name.text, "lever_arm_m": arm, "latency_s": gnss.latency.si, **known}
+
+
+Part = TypeVar("Part", bound=Strict)
+
+#: What is noisier or calmer than its sheet says, and what has larger or smaller biases, by group; each within
+#: which of the tolerances.
+_SCALED: Mapping[str, Mapping[str, tuple[str, ...]]] = {
+    "imu": {
+        "noise": ("gyro_random_walk", "accelerometer_random_walk"),
+        "bias": (
+            "gyro_bias_stability",
+            "gyro_turn_on_bias",
+            "accelerometer_bias_stability",
+            "accelerometer_turn_on_bias",
+        ),
+    },
+    "gnss": {
+        "noise": (
+            "horizontal_noise",
+            "vertical_noise",
+            "horizontal_correlated_sd",
+            "vertical_correlated_sd",
+            "velocity_noise",
+        )
+    },
+    "camera": {"noise": ("marking_sd",)},
+}
+
+
+def as_flown(twin: TwinParameters, seed: int) -> TwinParameters:
+    """The parameters that the sensors of one flight really have.
+
+    Noise densities and the standard deviations of biases are the sheet's times a factor drawn evenly within
+    one minus and one plus the tolerance, each its own; focal lengths, principal point and the angles of the
+    mount are the stated ones plus a normal error.
+
+    Parameters
+    ----------
+    twin
+        What is stated, with its ``tolerance``.
+    seed
+        Of the flight, a whole number from 0.
+
+    Returns
+    -------
+    TwinParameters
+        The twin itself where it has no tolerances.
+
+    Raises
+    ------
+    ValueError
+        Where the seed is negative.
+
+    Examples
+    --------
+    >>> from wildlab.simulation import load_twin
+    >>> stated = load_twin("static-antenna")
+    >>> as_flown(stated, 1).camera.fx.number == stated.camera.fx.number
+    False
+    """
+    tolerance = twin.tolerance
+    if tolerance is None:
+        return twin
+    found: dict[str, Any] = {}
+    for group, names in _SCALED.items():
+        part = getattr(twin, group)
+        if part is None:
+            continue
+        rng = stream(seed, f"{group} as flown")
+        for within, some in names.items():
+            part = _scaled(part, some, getattr(tolerance, within).si, rng)
+        if group == "camera":
+            longer = 1 + tolerance.focal_length.si * rng.standard_normal(2)
+            moved = tolerance.principal_point.si * rng.standard_normal(2)
+            part = _with(
+                part,
+                fx=part.fx.number * longer[0],
+                fy=part.fy.number * longer[1],
+                cx=part.cx.number + moved[0],
+                cy=part.cy.number + moved[1],
+            )
+        found[group] = part
+    turned = tolerance.mount.number * stream(seed, "mount as flown").standard_normal(3)
+    angles = [f"misalignment_{name}" for name in ("roll", "tilt", "pan")]
+    stated = [getattr(twin.mount, name).number for name in angles]
+    found["mount"] = _with(twin.mount, **dict(zip(angles, stated + turned, strict=True)))
+    return twin.model_copy(update=found)
+
+
+def _scaled(part: Part, names: tuple[str, ...], within: float, rng: np.random.Generator) -> Part:
+    factors = rng.uniform(1 - within, 1 + within, len(names))
+    return _with(
+        part,
+        **{name: getattr(part, name).number * factor for name, factor in zip(names, factors, strict=True)},
+    )
+
+
+def _with(part: Part, **values: float) -> Part:
+    changed: dict[str, Parameter] = {
+        name: getattr(part, name).model_copy(update={"value": float(value)}) for name, value in values.items()
+    }
+    return part.model_copy(update=changed)

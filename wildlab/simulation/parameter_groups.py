@@ -291,7 +291,7 @@ class Autopilot(Strict):
 
 
 class Tolerance(Strict):
-    """How far what is stated of the sensors may be from what they are: `wildlab.simulation.perturbed_flight`.
+    """How far what is stated of the sensors may be from what they are: `wildlab.simulation.manifest`.
 
     ``noise`` and ``bias`` are limits, as shares of noise densities and of standard deviations of biases;
     ``focal_length`` (a share), ``principal_point`` and ``mount`` are standard deviations, per axis.

@@ -16,9 +16,10 @@ from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
 from wildlab.simulation.camera_detections import exposure_times, frames_and_detections
+from wildlab.simulation.courses import twin_trajectory
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.landscape import twin_land
-from wildlab.simulation.manifest import twin_manifest
+from wildlab.simulation.manifest import as_flown, twin_manifest
 from wildlab.simulation.onboard_sensors import (
     autopilot_tables,
     gimbal_table,
@@ -29,10 +30,8 @@ from wildlab.simulation.onboard_sensors import (
     sample_times,
 )
 from wildlab.simulation.parameters import TwinParameters, load_twin
-from wildlab.simulation.perturbed_flight import as_flown
 from wildlab.simulation.target_motion import animals_truth, truth_table
 from wildlab.simulation.trajectory import Motion, camera_motion, turned
-from wildlab.simulation.twin_trajectory import twin_trajectory
 
 #: Nav sources of a twin.
 AUTOPILOT = "autopilot"

@@ -19,7 +19,7 @@ from wildlab.paths import DATA
 from wildlab.reporting.many_tracks import LARGEST, SMALLEST, rms_error
 from wildlab.reporting.report import Report
 from wildlab.studies.autoferry import tune_sensor
-from wildlab.studies.monte_carlo import record_spread
+from wildlab.studies.page import record_spread
 
 #: The ways to look: by one sensor, by both, and with the cameras too.
 MODES: dict[str, tuple[str, ...]] = {

@@ -29,7 +29,7 @@ from wildlab.simulation.scene.flights import corner_of
 from wildlab.simulation.target_motion import target_path
 from wildlab.studies import coloured_noise as coloured
 from wildlab.studies import linear_vs_nonlinear as filters
-from wildlab.studies.monte_carlo import interval_words
+from wildlab.studies.page import interval_words
 from wildlab.studies.rules import keys_of, load_rules
 from wildlab.studies.vessel_detection import Marks, Photographer, exposures_of, marks_of, with_detections
 

@@ -122,7 +122,7 @@ def run_trial(case: str, seed: int, parameters: Mapping[str, Any]) -> Values:
     """What the trial of a case gives for a seed, by "subject/name".
 
     Besides the trial's own there may be the parameter `VARIED`: factors for parameters of its twins, as
-    `wildlab.simulation.variation.varied` takes them.
+    `wildlab.simulation.parameters.varied` takes them.
 
     Raises
     ------
@@ -130,7 +130,7 @@ def run_trial(case: str, seed: int, parameters: Mapping[str, Any]) -> Values:
         If there is no such case, it has no trial, or what it gives is not numbers by (subject, name); and
         whatever the trial raises.
     """
-    from wildlab.simulation.variation import varied  # who lists the studies moves none
+    from wildlab.simulation.parameters import varied  # who lists the studies moves none
 
     trial = find_case(case).trial
     if trial is None:

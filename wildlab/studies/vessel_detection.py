@@ -42,10 +42,18 @@ from wildlab.reporting.charts.drawing import (
 from wildlab.reporting.figures import BLUE, INK, ORANGE, VERMILLION, new_figure
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.parameters import load_twin
-from wildlab.simulation.scene.flights import SceneFlight, VesselLook, Window, corner_of
+from wildlab.simulation.scene.flights import (
+    CameraResponse,
+    SceneFlight,
+    Sensor,
+    VesselLook,
+    Window,
+    corner_of,
+    expose,
+    sensor_of,
+)
 from wildlab.simulation.scene.render import RenderedView, SeenBody
-from wildlab.simulation.scene.response import CameraResponse, Sensor, expose, sensor_of
-from wildlab.studies.monte_carlo import pooled_share
+from wildlab.studies.page import pooled_share
 
 #: Of the pixels of a detection, the share on an object from which on it is one of that object.
 OVERLAP = 0.25

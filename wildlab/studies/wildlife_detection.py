@@ -34,12 +34,10 @@ from wildlab.reporting.figures import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLI
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.manifest import twin_manifest
 from wildlab.simulation.parameters import load_twin
-from wildlab.simulation.scene.bodies import ANIMALS, animal
-from wildlab.simulation.scene.drawn import LandDraw, Layout, draw_layout
-from wildlab.simulation.scene.ground import Weather
-from wildlab.simulation.scene.land import LandView, render_land
-from wildlab.simulation.scene.response import CameraResponse, Sensor, expose, sensor_of, to_counts
-from wildlab.studies.monte_carlo import interval_words
+from wildlab.simulation.scene.drawn import ANIMALS, LandDraw, Layout, animal, draw_layout
+from wildlab.simulation.scene.flights import CameraResponse, Sensor, expose, sensor_of, to_counts
+from wildlab.simulation.scene.land import LandView, Weather, render_land
+from wildlab.studies.page import interval_words
 from wildlab.studies.rules import keys_of
 
 #: When images are taken. F's were mostly taken under clouds, some in sunlight (F 7.4).

@@ -61,8 +61,7 @@ from wildlab.simulation.error_models import stream
 from wildlab.simulation.parameters import TwinParameters, load_twin
 from wildlab.studies import gondola_coverage as gondola
 from wildlab.studies import uav_coverage as uav
-from wildlab.studies.monte_carlo import interval_words
-from wildlab.studies.page import Shown
+from wildlab.studies.page import Shown, interval_words
 from wildlab.tracking.motion import Motion
 from wildlab.tracking.particles import Inside, walk_of
 

@@ -14,7 +14,7 @@ from wildlab.flight.readers.frames.scene import (
     measure_vignetting,
     without_vignetting,
 )
-from wildlab.simulation.scene.response import CameraResponse, Sensor, expose, sensor_of
+from wildlab.simulation.scene.flights import CameraResponse, Sensor, expose, sensor_of
 
 SHAPE = (128, 160)
 WHOLE = np.ones(SHAPE, bool)

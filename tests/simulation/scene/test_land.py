@@ -12,22 +12,21 @@ from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.mount import R_MC_DOWN, Mount
 from wildlab.simulation.landscape import TREES_M, UNEVEN, grow_trees, synthetic_landscape
-from wildlab.simulation.scene import (
+from wildlab.simulation.scene.drawn import animal, slab, tree
+from wildlab.simulation.scene.land import (
+    CLOUD_BLANKET,
     EVEN_LAND,
     GRASS,
     SAND,
+    SHADOW_DEPTH,
     Cover,
     Land,
     LandScene,
     Weather,
-    animal,
     ground_points,
     height_at,
     render_land,
-    slab,
-    tree,
 )
-from wildlab.simulation.scene.ground import CLOUD_BLANKET, SHADOW_DEPTH
 
 CAMERA = Camera(160, 128, 290.0, 292.0, 78.0, 66.0)
 SMOOTH = Cover(heating=20.0, cooling=0.0, lag=0.0, texture_sd=0.0)

@@ -8,18 +8,8 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.geometry.mount import Mount
-from wildlab.simulation.scene import (
-    EVEN,
-    Body,
-    Layer,
-    Scene,
-    Sea,
-    outline_of,
-    rectangle,
-    render,
-    vessel,
-)
-from wildlab.simulation.scene.sea import mean_square_slope, tiles_at
+from wildlab.simulation.scene.bodies import Body, Layer, rectangle, vessel
+from wildlab.simulation.scene.render import EVEN, Scene, Sea, mean_square_slope, outline_of, render, tiles_at
 
 CAMERA = Camera(160, 128, 290.0, 292.0, 78.0, 66.0)
 

@@ -4,15 +4,16 @@ import numpy as np
 import pytest
 
 from wildlab.simulation.parameters import load_twin
-from wildlab.simulation.scene import (
+from wildlab.simulation.scene.bodies import fitted_out, vessel
+from wildlab.simulation.scene.flights import (
     IDEAL,
     CameraResponse,
+    SceneFlight,
+    VesselLook,
     expose,
     sensor_of,
+    to_counts,
 )
-from wildlab.simulation.scene.bodies import fitted_out, vessel
-from wildlab.simulation.scene.flights import SceneFlight, VesselLook
-from wildlab.simulation.scene.response import to_counts
 
 SHAPE = (120, 160)
 

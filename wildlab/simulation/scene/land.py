@@ -1,24 +1,276 @@
 """Scenes on land: ground with stones, trees and animals as a camera at a pose sees it, with exact labels.
 
+The sun heats covers of the ground and a clear night cools them, by the time of day. A cover's temperature is
+that of the air, less what it radiates away, plus what the sun gave it. The sun's heat is kept for a while: a
+vector towards the sun, averaged over the past with an exponential weight, whose product with the normal of
+the ground is the heat that a slope has. All numbers are chosen; covers differ by what is known of them: dry
+sand becomes hottest, grass cools itself, rock keeps its warmth into the night.
+
 Bodies stand where their centres are, level, on the height of the ground there. They hide one another and the
 ground; the ground hides no body, so hills must be gentle for the camera's angle.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy import fft
 
+from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera, normalise
 from wildlab.geometry.frames import Array
-from wildlab.simulation.scene import ground_kernels as kernels
+from wildlab.simulation.scene import kernels
 from wildlab.simulation.scene.bodies import Body
-from wildlab.simulation.scene.ground import SHADOW_DEPTH, SUNLIT_UNEVEN, UNEVEN, Land
-from wildlab.simulation.scene.kernels import sampled
 from wildlab.simulation.scene.render import SeenBody, check_above, draw_bodies, pixel_coordinates
+
+Tile = NDArray[np.float32]
+
+#: Side (m) and cells along it of the tile of unevenness.
+UNEVEN = (64.0, 1024)
+#: What a cloud takes of the sun's heat: the rest is diffuse, or was kept from before.
+SHADOW_DEPTH = 0.75
+#: What clouds take of the night's cooling: they radiate nearly as the ground does.
+CLOUD_BLANKET = 0.8
+#: How uneven sunlit ground is, as a share of its heat: tufts and stones throw shadows.
+SUNLIT_UNEVEN = 0.08
+#: Of a day's average for the sun's heat, minutes.
+_STEP = 2.0
+#: Elevation of the sun at 12, rad; the air's mean over the day and how far it goes from it, K, warmest at 15.
+NOON_ELEVATION, AIR_MEAN, AIR_SWING = float(np.radians(55.0)), 288.0, 5.0
+
+
+@dataclass(frozen=True)
+class Cover:
+    """What lies on the ground.
+
+    Attributes
+    ----------
+    heating
+        How much warmer than the air it would become under a sun straight above its surface, K.
+    cooling
+        How much colder than the air a clear sky makes it, K.
+    lag
+        How long it keeps its heat, h.
+    texture_sd
+        Of what is uneven on it without sun, K.
+    """
+
+    heating: float
+    cooling: float
+    lag: float
+    texture_sd: float
+
+
+#: Grass evaporates water and keeps little heat; sand heats most; rock keeps it for hours.
+GRASS = Cover(heating=12.0, cooling=4.0, lag=0.5, texture_sd=0.5)
+SAND = Cover(heating=26.0, cooling=3.0, lag=1.0, texture_sd=0.3)
+ROCK = Cover(heating=24.0, cooling=0.5, lag=4.0, texture_sd=0.4)
+
+
+@dataclass(frozen=True)
+class Weather:
+    """Time of day, clouds, and air.
+
+    Attributes
+    ----------
+    hour
+        Local solar time: the sun rises at 6, is highest at 12, and sets at 18.
+    clouds
+        Share of the sky that clouds cover; they shade all of the ground as much.
+    """
+
+    hour: float = 12.0
+    clouds: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.clouds <= 1:
+            raise WildlabError(
+                f"clouds over {self.clouds:g} of the sky", "give a share from 0 to 1", field="clouds"
+            )
+        if not 0 <= self.hour < 24:
+            raise WildlabError(f"an hour of {self.hour:g}", "give one from 0 to below 24", field="hour")
+
+    @property
+    def air(self) -> float:
+        """Temperature of the air, K."""
+        return AIR_MEAN + AIR_SWING * float(np.cos(2 * np.pi * (self.hour - 15) / 24))
+
+    @property
+    def sun(self) -> Array:
+        """Unit vector towards the sun, (3,) north, east, up; below the horizon at night."""
+        return np.asarray(_sun(np.array([self.hour]))[0])
+
+    def kept(self, lag: float) -> Array:
+        """The sun's vector averaged over the past with that lag (h), (3,); zero while it is below."""
+        return np.asarray(_kept(self.hour, lag))
+
+    def heat(self, cover: Cover) -> Array:
+        """What the sun gives level ground of a cover, and slopes by their normal: (3,) K."""
+        return np.asarray(cover.heating * self.kept(cover.lag))
+
+    def loss(self, cover: Cover) -> float:
+        """What a cover loses to the sky, K."""
+        return cover.cooling * (1 - CLOUD_BLANKET * self.clouds)
+
+    def level(self, cover: Cover) -> float:
+        """Temperature of level ground of a cover, as an average over what clouds shade, K."""
+        lit = 1 - SHADOW_DEPTH * self.clouds
+        return self.air - self.loss(cover) + float(self.heat(cover)[2]) * lit
+
+
+def _sun(hours: Array) -> Array:
+    """(N, 3) north, east, up: the way of the sun at an equinox."""
+    angle = np.pi * (np.asarray(hours, float) - 6) / 12
+    high = np.sin(angle)
+    return np.stack([-np.cos(NOON_ELEVATION) * high, np.cos(angle), np.sin(NOON_ELEVATION) * high], axis=-1)
+
+
+@lru_cache(maxsize=64)
+def _kept(hour: float, lag: float) -> Array:
+    if lag <= 0:
+        sun = _sun(np.array([hour]))[0]
+        return sun if sun[2] > 0 else np.zeros(3)
+    back = (np.arange(0, 72 * 60, _STEP) + _STEP / 2) / 60
+    sun = _sun(hour - back)
+    weight = np.exp(-back / lag)
+    weight /= weight.sum()
+    return np.asarray((weight * (sun[:, 2] > 0)) @ sun)
+
+
+@dataclass(frozen=True, eq=False)
+class Land:
+    """Ground with relief and covers, that repeats every `side` metres both ways.
+
+    Attributes
+    ----------
+    heights
+        (n, n) m above zero, first axis north, second east; n a power of two. The plane is zeros.
+    cover
+        (m, m), number of the cover in ``covers``; m a power of two.
+    side
+        m.
+    covers
+        By number.
+    weather
+        Time of day, clouds, air.
+    seed
+        Of unevenness.
+    """
+
+    heights: Array = field(default_factory=lambda: np.zeros((4, 4)))
+    cover: NDArray[np.integer] = field(default_factory=lambda: np.zeros((4, 4), np.int64))
+    side: float = 256.0
+    covers: tuple[Cover, ...] = (GRASS, SAND, ROCK)
+    weather: Weather = field(default_factory=Weather)
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("heights", "cover"):
+            shape = np.shape(getattr(self, name))
+            if len(shape) != 2 or shape[0] != shape[1] or shape[0] < 2 or shape[0] & (shape[0] - 1):
+                raise WildlabError(
+                    f"{name} of the shape {shape}", "give a square array, its side a power of two", field=name
+                )
+        if not np.isfinite(self.heights).all():
+            raise WildlabError("a height is no number", "give heights in metres", field="heights")
+        if np.min(self.cover) < 0 or np.max(self.cover) >= len(self.covers):
+            raise WildlabError(
+                f"covers from {np.min(self.cover)} to {np.max(self.cover)}, of {len(self.covers)}",
+                "number them from 0",
+                field="cover",
+            )
+
+    @cached_property
+    def relief(self) -> Tile:
+        """(n, n, 3) height and slopes to the north and east, by central differences."""
+        cell = self.side / len(self.heights)
+        high = np.asarray(self.heights, float)
+        north, east = (
+            (np.roll(high, -1, axis) - np.roll(high, 1, axis)) / (2 * cell) for axis in (0, 1)
+        )  # the tile repeats
+        return np.stack([high, north, east], axis=-1).astype(np.float32)
+
+    @cached_property
+    def warmth(self) -> Tile:
+        """(m, m, 5) by place: K over the air without sun, the sun's heat (3), and unevenness (K)."""
+        values = [[-self.weather.loss(one), *self.weather.heat(one), one.texture_sd] for one in self.covers]
+        return np.asarray(np.array(values, np.float32)[np.asarray(self.cover)])
+
+    @property
+    def uneven(self) -> Tile:
+        """(k, k) of unit deviation; a tile of `UNEVEN`."""
+        if all(one.texture_sd == 0 for one in self.covers):
+            return np.zeros((2, 2), np.float32)
+        return smooth_tile(UNEVEN[1], 1.5 * UNEVEN[1] / UNEVEN[0], self.seed % 8)
+
+
+#: Even ground as warm as the air, flat: what stands on it is known in closed form.
+EVEN_LAND = Land(covers=(Cover(heating=0.0, cooling=0.0, lag=1.0, texture_sd=0.0),))
+
+
+@lru_cache(maxsize=8)
+def smooth_tile(cells: int, coarse: float, seed: int) -> Tile:
+    """A random tile (cells, cells) that repeats, of zero mean and unit deviation; small things are weaker.
+
+    Parameters
+    ----------
+    cells
+        Along a side.
+    coarse
+        Above so many cells things are equally strong.
+    seed
+        Of it.
+
+    Returns
+    -------
+    (cells, cells) float32
+    """
+    k = fft.fftfreq(cells)
+    size2 = (k[:, None] ** 2 + k[None, : cells // 2 + 1] ** 2) * (2 * np.pi * coarse) ** 2
+    noise = np.random.default_rng([seed, cells]).standard_normal((cells, cells), np.float32)
+    spectrum = fft.rfft2(noise) * (1 / (1 + size2) ** 0.75).astype(np.float32)
+    spectrum[0, 0] = 0
+    made = fft.irfft2(spectrum, (cells, cells))
+    return np.asarray(made / made.std(), np.float32)
+
+
+#: Of the heights of `rolling_land`, m, over hills some 60 m long; how much of it grass, sand and rock have.
+RELIEF_M, SHARES = 2.0, (0.7, 0.2, 0.1)
+
+
+def rolling_land(weather: Weather, seed: int = 0) -> Land:
+    """Gently rolling ground with patches of grass, sand and rock.
+
+    Parameters
+    ----------
+    weather
+        Time of day, clouds, air.
+    seed
+        Of its forms and patches: sand and rock lie together where a smooth random field is highest.
+
+    Returns
+    -------
+    Land
+
+    Examples
+    --------
+    >>> land = rolling_land(Weather(hour=13.0), seed=3)
+    >>> [round(float((land.cover == one).mean()), 1) for one in range(3)]
+    [0.7, 0.2, 0.1]
+    """
+    k = fft.fftfreq(64) * 64
+    size2 = k[:, None] ** 2 + k[None, :] ** 2
+    noise = np.random.default_rng([seed, 1]).standard_normal((64, 64))
+    high = fft.ifft2(np.exp(-size2 / (2 * 2.5**2)) * (size2 > 0) * fft.fft2(noise)).real
+    field_of_patches = smooth_tile(512, 20.0, seed + 1000)
+    edges = np.quantile(field_of_patches, np.cumsum(SHARES)[:2])
+    cover = np.searchsorted(edges, field_of_patches)
+    return Land(RELIEF_M * high / high.std(), cover, weather=weather, seed=seed)
+
 
 #: How much colder than the air a clear sky is, and a closed cover of clouds, K.
 CLEAR_SKY, CLOUDED_SKY = 35.0, 4.0
@@ -85,8 +337,8 @@ def render_land(scene: LandScene, camera: Camera, p_nc: ArrayLike, R_nc: ArrayLi
     --------
     >>> from wildlab.geometry import Camera
     >>> from wildlab.geometry.mount import R_MC_DOWN
-    >>> from wildlab.simulation.scene.bodies import slab
-    >>> from wildlab.simulation.scene.ground import EVEN_LAND
+    >>> from wildlab.simulation.scene.drawn import slab
+    >>> from wildlab.simulation.scene.land import EVEN_LAND
     >>> camera = Camera(64, 48, 100.0, 100.0, 31.5, 23.5)
     >>> scene = LandScene(EVEN_LAND, (slab(10.0, 4.0, 8.0),))
     >>> view = render_land(scene, camera, [0.0, 0.0, -50.0], R_MC_DOWN)
@@ -128,7 +380,7 @@ def height_at(land: Land, place: ArrayLike) -> float:
     1.0
     """
     north, east = np.asarray(place, float)
-    return sampled(land.relief[..., 0], len(land.heights) / land.side, north, east)
+    return kernels.sampled(land.relief[..., 0], len(land.heights) / land.side, north, east)
 
 
 def ground_points(land: Land, camera: Camera, p_nc: ArrayLike, R_nc: ArrayLike, uv: ArrayLike) -> Array:
