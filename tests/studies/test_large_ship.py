@@ -97,7 +97,7 @@ def test_exact_centres_and_poses_put_the_ship_where_it_is(taken, tracked):
     exact = taken.camera.flight.poses.take(marks.exposure[inside])
     seen = np.array([taken.shots[k].seen[0].uv for k in inside])
     points = georeference_pixels(exact, seen, np.zeros(len(seen)))[:, :2]
-    bodies = np.array([taken.camera.flight.bodies(int(marks.exposure[k]))[0].centre(0.0) for k in inside])
+    bodies = np.array([taken.camera.flight.bodies(int(marks.exposure[k]))[0].centre for k in inside])
     assert np.allclose(points, bodies[:, :2], atol=1e-6)
     # The receiver is some metres ahead of the ship's middle and a few metres wrong itself.
     truth = np.nanmean(tracked[WITH].seen.truth[:, :2], axis=0)

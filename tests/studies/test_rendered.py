@@ -33,7 +33,7 @@ def test_the_stated_centre_is_the_target_seen_through_the_true_pose(camera, shot
     for shot in shots:
         pose = camera.flight.poses.take(shot.exposure)
         body = camera.flight.bodies(shot.exposure)[0]
-        uv = ground_to_pixel(pose.camera, body.centre(0.0)[None], pose.p_nc, pose.R_nc)[0]
+        uv = ground_to_pixel(pose.camera, body.centre[None], pose.p_nc, pose.R_nc)[0]
         assert np.allclose(uv, shot.seen[0].uv)
 
 
@@ -67,8 +67,8 @@ def test_a_window_is_that_part_of_the_whole_image():
     exposures = exposures_of(flown.detections)[::60]
     for exposure in map(int, exposures):
         window = camera.flight.window(exposure, 20)
-        part = camera.flight.view(exposure, waves_move=False, window=window)
-        whole = camera.flight.view(exposure, waves_move=False)
+        part = camera.flight.view(exposure, window)
+        whole = camera.flight.view(exposure)
         assert part.kelvin.size < 0.1 * whole.kelvin.size
         assert np.array_equal(part.kelvin, whole.kelvin[window.slices])
         assert np.array_equal(part.labels, whole.labels[window.slices])

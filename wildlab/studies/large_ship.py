@@ -178,7 +178,7 @@ def errors_of(one: Tracked) -> tuple[Array, Array]:
 
 def centres_of(taken: Photographs, one: Tracked) -> Array:
     """Where the ship's centre truly is at each image, (N, 2), m: not its receiver, which is ahead of it."""
-    return np.array([taken.camera.flight.bodies(int(row))[0].centre(0.0)[:2] for row in one.marks.exposure])
+    return np.array([taken.camera.flight.bodies(int(row))[0].centre[:2] for row in one.marks.exposure])
 
 
 def time_to_rest(times: Array, speed: Array) -> float:

@@ -391,7 +391,7 @@ def plot_path(looked: Looked) -> Figure:
     draw_way(ax, way, ORANGE, "airframe, by the autopilot", width=1.7)
     ax.plot(*way[0, ::-1], "o", color=ORANGE, ms=6)
     body = looked.scene.bodies(0)[0]
-    ax.fill(*body.corners(body.layers[0], 0.0)[:, 1::-1].T, color=INK, label="ship")
+    ax.fill(*body.corners(body.layers[0])[:, 1::-1].T, color=INK, label="ship")
     map_axes(ax)
     return finish(fig)
 
@@ -413,7 +413,7 @@ def plot_features(looked: Looked) -> Figure:
     """Features on the ship in one image, and how far each moved to the next: H figures 4.2, 5.13."""
     counts = [len(pair.matches) for pair in looked.pairs]
     pair = looked.pairs[int(np.argsort(counts)[len(counts) // 2])]
-    kelvin = looked.scene.view(pair.first, waves_move=False).kelvin
+    kelvin = looked.scene.view(pair.first).kelvin
     fig, ax = new_figure(5.4, 4.5)
     draw_picture(ax, kelvin, limits=(float(kelvin.min()), float(np.quantile(kelvin, 0.995))))
     at, moved = pair.matches.first, LONGER * (pair.matches.second - pair.matches.first)

@@ -158,7 +158,7 @@ class Photographer:
         -------
         (view, counts)
         """
-        view = self.flight.view(exposure, waves_move=False, window=window)
+        view = self.flight.view(exposure, window)
         sensor = self._sensor
         if window is not None:
             here = window.slices
@@ -441,7 +441,7 @@ def images_of(twin: str, second: str, seed: int, images: int) -> Iterator[Image]
             chosen = {subjects[kind]: numbers for kind, numbers in choose(flight, images, rng).items()}
         for subject, exposures in chosen.items():
             for exposure in sorted(exposures):
-                view = flight.view(exposure, waves_move=False)
+                view = flight.view(exposure)
                 yield Image(subject, view, expose(view.kelvin, response, sensor, rng))
 
 

@@ -125,12 +125,6 @@ def test_a_tree_hides_what_is_under_it():
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: Weather(clouds=1.5), "0 to 1"),
-        (lambda: Weather(hour=25.0), "below 24"),
-        (lambda: Land(np.zeros((3, 3))), "power of two"),
-        (lambda: Land(np.full((2, 2), np.nan)), "metres"),
-        (lambda: Land(cover=np.full((2, 2), 7)), "from 0"),
-        (lambda: animal("whale", Weather()), "rhinoceros"),
         (lambda: render_land(LandScene(EVEN_LAND), CAMERA, [0, 0, 1.0], R_MC_DOWN), "raise"),
         (lambda: render_land(LandScene(hilly()), CAMERA, [32.0, 0, -3.5], R_MC_DOWN), "-0.5 m above"),
     ],

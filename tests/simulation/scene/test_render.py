@@ -9,7 +9,7 @@ from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.geometry.mount import Mount
 from wildlab.simulation.scene.bodies import Body, Layer, rectangle, vessel
-from wildlab.simulation.scene.render import EVEN, Scene, Sea, mean_square_slope, outline_of, render, tiles_at
+from wildlab.simulation.scene.render import EVEN, Scene, Sea, mean_square_slope, outline_of, render, tiles_of
 
 CAMERA = Camera(160, 128, 290.0, 292.0, 78.0, 66.0)
 
@@ -19,9 +19,9 @@ def poses(height, roll=0.0, pitch=0.0, yaw=0.0, camera=CAMERA):
     return CameraPoses(camera, Mount("down"), np.array([0.0, 0.0, -height]), R_nb)
 
 
-def shown(sea, bodies, at, *time):
+def shown(sea, bodies, at):
     """What the camera of the poses sees of bodies on a sea."""
-    return render(Scene(sea, bodies), at.camera, at.p_nc, at.R_nc, *time)
+    return render(Scene(sea, bodies), at.camera, at.p_nc, at.R_nc)
 
 
 def rendered(body, height=60.0, camera=CAMERA, sea=EVEN, **angles):
@@ -113,18 +113,11 @@ def test_the_horizon_is_where_the_rays_are_level():
     assert view.kelvin[view.water].mean() > view.kelvin[~view.water].mean()
 
 
-def test_slopes_are_those_of_cox_and_munk_and_travel():
+def test_slopes_are_those_of_cox_and_munk():
     sea = Sea(wind_speed=7.0, seed=3)
-    tiles = tiles_at(sea, 0.0)
+    tiles = tiles_of(sea)
     total = sum(float((tile.astype(float) ** 2).sum(axis=-1).mean()) for tile in (tiles.waves, tiles.ripples))
     assert np.isclose(total, mean_square_slope(7.0), rtol=0.02)
-    soon, later = tiles_at(sea, 0.05).ripples, tiles_at(sea, 20.0).ripples
-
-    def alike(other):
-        return float(np.corrcoef(tiles.ripples.ravel(), other.ravel())[0, 1])
-
-    assert alike(soon) > 0.8
-    assert abs(alike(later)) < 0.3
     assert np.isclose(tiles.patches.std(), sea.patches_sd, rtol=1e-3)
 
 
@@ -147,23 +140,19 @@ def test_the_sun_glints_where_it_is_mirrored():
     assert shown(sea, (), away).kelvin.max() < 286.1
 
 
-def test_a_moving_vessel_is_elsewhere_later_and_leaves_a_wake():
-    boat = vessel(12.0, 4.0, 6.0, speed=3.0, seed=1).at(0.0, 0.0, np.pi / 2, 3.0)
-    assert np.allclose(boat.centre(2.0), [0.0, 6.0, 0.0])
-    at = poses(100.0)
-    views = [shown(EVEN, (boat,), at, time) for time in (0.0, 2.0)]
-    assert np.isclose(views[1].seen[0].uv[0] - views[0].seen[0].uv[0], 290 * 6 / 100)
-    behind = views[0].kelvin[66, 78 - 25]
-    assert views[0].labels[66, 78 - 25] == 0
-    assert behind > 286.05
-    assert np.isclose(views[0].kelvin[66, 78 + 25], 286.0, atol=1e-3)
+def test_a_moving_vessel_leaves_a_wake():
+    boat = vessel(12.0, 4.0, 6.0, speed=3.0, seed=1).at(0.0, 0.0, np.pi / 2)
+    view = shown(EVEN, (boat,), poses(100.0))
+    assert view.labels[66, 78 - 25] == 0
+    assert view.kelvin[66, 78 - 25] > 286.05
+    assert np.isclose(view.kelvin[66, 78 + 25], 286.0, atol=1e-3)
 
 
 def test_outlines_are_exact_projections():
     body = vessel(12.0, 4.0, seed=1).at(5.0, 3.0, 1.0)
     at = poses(80.0, pitch=15)
     hull = outline_of(body, CAMERA, at.p_nc, at.R_nc)
-    corners = np.concatenate([body.corners(layer, 0.0) for layer in body.layers])
+    corners = np.concatenate([body.corners(layer) for layer in body.layers])
     down = (corners - at.p_nc) @ at.R_nc
     projected = down[:, :2] / down[:, 2:] * [290.0, 292.0] + [78.0, 66.0]
     assert hull is not None

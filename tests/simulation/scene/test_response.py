@@ -87,8 +87,8 @@ def flight():
 
 def test_a_window_shows_what_the_whole_image_shows_there(flight):
     part = flight.window(60, 40)
-    whole = flight.view(60, waves_move=False)
-    seen = flight.view(60, waves_move=False, window=part)
+    whole = flight.view(60)
+    seen = flight.view(60, part)
     assert seen.kelvin.shape == (part.height, part.width)
     assert seen.kelvin.size < 0.7 * whole.kelvin.size
     assert np.allclose(seen.kelvin, whole.kelvin[part.slices], atol=1e-3)

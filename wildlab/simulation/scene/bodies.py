@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.simulation.camera_detections import moments
 
@@ -71,8 +71,8 @@ class Body:
         What it is, as labels say it.
     layers
         From the water up.
-    north, east, course, speed
-        Where its centre is at time zero (m), where it points and how fast it goes (rad, m/s).
+    north, east, course
+        Where its centre is (m), and where it points (rad).
     wake
         None where there is none.
     texture_seed
@@ -84,52 +84,34 @@ class Body:
     north: float = 0.0
     east: float = 0.0
     course: float = 0.0
-    speed: float = 0.0
     wake: Wake | None = None
     texture_seed: int = 0
 
-    def __post_init__(self) -> None:
-        for layer in self.layers:
-            corners = np.array(layer.outline, float)
-            if corners.ndim != 2 or corners.shape[0] < 3 or corners.shape[1] != 2:
-                raise WildlabError(
-                    f"an outline of {len(layer.outline)} corners",
-                    "give at least three (x, y)",
-                    field="outline",
-                )
-            edge = np.roll(corners, -1, axis=0) - corners
-            following = np.roll(edge, -1, axis=0)
-            turns = edge[:, 0] * following[:, 1] - edge[:, 1] * following[:, 0]
-            if not ((turns >= -1e-9).all() or (turns <= 1e-9).all()):
-                raise WildlabError(
-                    "an outline turns inward somewhere",
-                    "give convex outlines, or more layers",
-                    field="outline",
-                )
+    def at(self, north: float, east: float, course: float = 0.0) -> Body:
+        """The same body elsewhere, m and rad."""
+        return replace(self, north=north, east=east, course=course)
 
-    def at(self, north: float, east: float, course: float = 0.0, speed: float = 0.0) -> Body:
-        """The same body elsewhere, m, rad and m/s."""
-        return replace(self, north=north, east=east, course=course, speed=speed)
-
-    def centre(self, time: float) -> Array:
-        """Its centre on the water at a time, (3,) m in n."""
-        along = self.speed * time
-        return np.array(
-            [self.north + along * np.cos(self.course), self.east + along * np.sin(self.course), 0.0]
-        )
-
-    def top(self, time: float) -> Array:
-        """The same at the height of its uppermost layer."""
-        return self.centre(time) - [0.0, 0.0, max(layer.height for layer in self.layers)]
-
-    def corners(self, layer: Layer, time: float) -> Array:
-        """Corners of one of its layers at a time, (K, 3) m in n."""
+    def place(self, x: ArrayLike, y: ArrayLike, height: float = 0.0) -> Array:
+        """Places (K, 3) m in n that are so far ahead and to the right (K,) of its centre, m."""
+        ahead, right = np.asarray(x, float), np.asarray(y, float)
         cos, sin = np.cos(self.course), np.sin(self.course)
+        north, east = self.north + cos * ahead - sin * right, self.east + sin * ahead + cos * right
+        return np.stack([north, east, np.full(len(ahead), -height)], axis=1)
+
+    @property
+    def centre(self) -> Array:
+        """Its centre on the water, (3,) m in n."""
+        return np.array([self.north, self.east, 0.0])
+
+    @property
+    def top(self) -> Array:
+        """The same at the height of its uppermost layer."""
+        return self.centre - [0.0, 0.0, max(layer.height for layer in self.layers)]
+
+    def corners(self, layer: Layer) -> Array:
+        """Corners of one of its layers, (K, 3) m in n."""
         x, y = np.array(layer.outline, float).T
-        north, east, _ = self.centre(time)
-        return np.stack(
-            [north + cos * x - sin * y, east + sin * x + cos * y, np.full(len(x), -layer.height)], axis=1
-        )
+        return self.place(x, y, layer.height)
 
 
 def rectangle(length: float, beam: float, excess: float, height: float = 0.0) -> Body:
@@ -154,18 +136,18 @@ def rectangle(length: float, beam: float, excess: float, height: float = 0.0) ->
     return Body("rectangle", (Layer(outline, height, excess),))
 
 
-def hull(length: float, beam: float, bow: float = 0.25) -> tuple[tuple[float, float], ...]:
-    """Outline of a hull about the centre of its area: straight sides, a blunt stern, a bow of that share."""
-    x, y, shoulder = length / 2, beam / 2, length * (0.5 - bow)
+def hull(length: float, beam: float) -> tuple[tuple[float, float], ...]:
+    """Outline of a hull about the centre of its area: straight sides, a blunt stern, a bow of a quarter."""
+    x, y, shoulder = length / 2, beam / 2, length / 4
     corners = np.array(
         [
             (x, 0.0),
-            (x - 0.35 * bow * length, 0.62 * y),
+            (x - 0.35 * 0.25 * length, 0.62 * y),
             (shoulder, y),
             (-x, 0.9 * y),
             (-x, -0.9 * y),
             (shoulder, -y),
-            (x - 0.35 * bow * length, -0.62 * y),
+            (x - 0.35 * 0.25 * length, -0.62 * y),
         ]
     )
     ahead = moments(corners)[1][0]
@@ -224,7 +206,7 @@ def vessel(
     )
     top = Layer(back, 1.8 * freeboard, 1.2 * excess, texture, 0.1 * length)
     wake = None if speed == 0 else Wake(min(12.0 * speed, 8 * length), 1.1 * beam, 0.25 * np.sqrt(speed))
-    return Body("vessel", (*levels, deck, top), speed=speed, wake=wake, texture_seed=seed)
+    return Body("vessel", (*levels, deck, top), wake=wake, texture_seed=seed)
 
 
 def fitted_out(body: Body, count: int, excess: float, rng: np.random.Generator) -> Body:

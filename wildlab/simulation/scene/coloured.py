@@ -15,7 +15,6 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera, normalise
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import ground_to_pixel
@@ -54,14 +53,6 @@ class Tarpaulin:
     north: float = 0.0
     east: float = 0.0
     course: float = 0.0
-
-    def __post_init__(self) -> None:
-        if not (self.length > 0 and self.width > 0 and self.rim >= 0 and 0 <= self.faded <= 1):
-            raise WildlabError(
-                f"a tarpaulin of {self.length:g} x {self.width:g} m, its rim of {self.rim:g} m faded by "
-                f"{self.faded:g}",
-                "give lengths above zero, a rim of zero or more, and a share",
-            )
 
     def corners(self) -> Array:
         """Corners in order, (4, 3) m in n."""

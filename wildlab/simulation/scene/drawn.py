@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, euler_to_matrix
@@ -82,14 +81,7 @@ def animal(kind: str, weather: Weather, seed: int = 0) -> Body:
     -------
     Body
         At the origin, looking north.
-
-    Raises
-    ------
-    WildlabError
-        Where there is no such kind.
     """
-    if kind not in ANIMALS:
-        raise WildlabError(f"there is no animal {kind!r}", f"use one of: {', '.join(ANIMALS)}", field="kind")
     k = ANIMALS[kind]
     sun = SUNNED * float(weather.kept(0.3)[2]) * (1 - SHADOW_DEPTH * weather.clouds)
     skin = k.bare * (BLOOD - weather.air) + sun
@@ -351,7 +343,7 @@ def draw_layout(rng: np.random.Generator, camera: Camera, draw: LandDraw) -> Lay
     places = {True: somewhere(draw.border), False: somewhere(0.0)}
     mark = replace(animal("calf", Weather()), kind="mark")
     for kind, metres in wanted:
-        taken = [one.at.centre(0.0) for one in things]
+        taken = [one.at.centre for one in things]
         apart = 1.2 * longest if kind in ANIMALS else 0.7 * (metres + 1.0)
         put = scatter(rng, [mark], places[kind in ANIMALS], apart, taken)
         if put:

@@ -11,7 +11,6 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
@@ -118,18 +117,7 @@ def expose(
     Returns
     -------
     (H, W) counts.
-
-    Raises
-    ------
-    WildlabError
-        Where the sensor has another number of pixels.
     """
-    if sensor.offset.shape != kelvin.shape:
-        raise WildlabError(
-            f"a sensor of {sensor.offset.shape} pixels for an image of {kelvin.shape}",
-            "draw one of that size with sensor_of",
-            field="sensor",
-        )
     seen: NDArray[Any] = np.asarray(kelvin, np.float32)
     if response.blur_sd > 0:
         seen = np.asarray(cv2.GaussianBlur(seen, (0, 0), response.blur_sd, borderType=cv2.BORDER_REPLICATE))
@@ -296,15 +284,13 @@ class SceneFlight:
             return None
         return Window(int(left), int(top), int(right - left), int(bottom - top))
 
-    def view(self, exposure: int, *, waves_move: bool = True, window: Window | None = None) -> RenderedView:
+    def view(self, exposure: int, window: Window | None = None) -> RenderedView:
         """The image of an exposure in kelvin, with its labels.
 
-        Waves that stand still are quicker, and as good for single images: each shows another place. Of a
-        ``window`` the pixels are those of the whole image, to the last bit, and pixels are counted from it.
+        Waves stand still: each image shows another place of them. Of a ``window`` the pixels are those of the
+        whole image, to the last bit, and pixels are counted from it.
         """
-        pose, time = self.poses.take(exposure), float(self.times[exposure])
-        # The vessels are where they are already: their own motion from time zero on must not be added.
-        bodies = tuple(replace(body, speed=0.0) for body in self.bodies(exposure))
-        scene = Scene(self.sea, bodies)
+        pose = self.poses.take(exposure)
+        scene = Scene(self.sea, self.bodies(exposure))
         camera = self.poses.camera if window is None else window.of(self.poses.camera)
-        return render(scene, camera, pose.p_nc, pose.R_nc, time if waves_move else 0.0)
+        return render(scene, camera, pose.p_nc, pose.R_nc)

@@ -20,7 +20,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import fft
 
-from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera, normalise
 from wildlab.geometry.frames import Array
 from wildlab.simulation.scene import kernels
@@ -85,14 +84,6 @@ class Weather:
 
     hour: float = 12.0
     clouds: float = 0.0
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.clouds <= 1:
-            raise WildlabError(
-                f"clouds over {self.clouds:g} of the sky", "give a share from 0 to 1", field="clouds"
-            )
-        if not 0 <= self.hour < 24:
-            raise WildlabError(f"an hour of {self.hour:g}", "give one from 0 to below 24", field="hour")
 
     @property
     def air(self) -> float:
@@ -167,22 +158,6 @@ class Land:
     covers: tuple[Cover, ...] = (GRASS, SAND, ROCK)
     weather: Weather = field(default_factory=Weather)
     seed: int = 0
-
-    def __post_init__(self) -> None:
-        for name in ("heights", "cover"):
-            shape = np.shape(getattr(self, name))
-            if len(shape) != 2 or shape[0] != shape[1] or shape[0] < 2 or shape[0] & (shape[0] - 1):
-                raise WildlabError(
-                    f"{name} of the shape {shape}", "give a square array, its side a power of two", field=name
-                )
-        if not np.isfinite(self.heights).all():
-            raise WildlabError("a height is no number", "give heights in metres", field="heights")
-        if np.min(self.cover) < 0 or np.max(self.cover) >= len(self.covers):
-            raise WildlabError(
-                f"covers from {np.min(self.cover)} to {np.max(self.cover)}, of {len(self.covers)}",
-                "number them from 0",
-                field="cover",
-            )
 
     @cached_property
     def relief(self) -> Tile:
@@ -361,9 +336,9 @@ def render_land(scene: LandScene, camera: Camera, p_nc: ArrayLike, R_nc: ArrayLi
     )  # fmt: skip
     labels = np.zeros(shape, np.int16)
     # A body is drawn about the ground under it: the camera is as much lower as the ground is higher.
-    ground_heights = [height_at(land, body.centre(0.0)[:2]) for body in scene.bodies]
+    ground_heights = [height_at(land, body.centre[:2]) for body in scene.bodies]
     lifted = [p + np.array([0.0, 0.0, high]) for high in ground_heights]
-    seen = draw_bodies(scene.bodies, camera, lifted, R, 0.0, weather.air, kelvin, labels)
+    seen = draw_bodies(scene.bodies, camera, lifted, R, weather.air, kelvin, labels)
     return LandView(kelvin, labels, ground, seen)
 
 

@@ -3,10 +3,9 @@
 Pixels are squares about their centres, the upper left one's at (0, 0), as in OpenCV and in
 `wildlab.detection`; projection is that of `wildlab.geometry`, both ways.
 
-The sea is waves and ripples that tilt a mirror of the sky, patches, and sun glint. Heights of a wind sea are
-a sum of waves of random phase that travel by the dispersion relation of deep water; here only their slopes
-are wanted, which come out of one inverse Fourier transform per tile and time. Tiles repeat: the long one
-every 256 m, the one of ripples every 16 m.
+The sea is waves and ripples that stand still and tilt a mirror of the sky, patches, and sun glint. Of a wind
+sea only the slopes are wanted, which come out of one inverse Fourier transform per tile. Tiles repeat: the
+long one every 256 m, the one of ripples every 16 m.
 """
 
 from __future__ import annotations
@@ -19,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import fft
+from scipy.spatial import ConvexHull
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera, normalise
@@ -70,16 +70,6 @@ class Sea:
     glint_width: float = 0.06
     seed: int = 0
 
-    def __post_init__(self) -> None:
-        if not 0 <= self.wind_speed <= 20:
-            raise WildlabError(
-                f"a wind of {self.wind_speed} m/s", "give one from 0 to 20 m/s", field="wind_speed"
-            )
-        if not 200 < self.temperature < 330:
-            raise WildlabError(
-                f"a sea of {self.temperature} K", "give its temperature in kelvin", field="temperature"
-            )
-
 
 #: An even sea, as a test's truth wants it: no waves, no patches, and a sky that is as warm as the water.
 EVEN = Sea(wind_speed=0.0, patches_sd=0.0, air=286.0, zenith=286.0)
@@ -98,42 +88,33 @@ def mean_square_slope(wind_speed: float) -> float:
     return 0.003 + 0.00512 * wind_speed if wind_speed > 0 else 0.0
 
 
-@lru_cache(maxsize=8)
-def _amplitudes(side: float, cells: int, wind_speed: float, wind_from: float, seed: int) -> tuple:  # type: ignore[type-arg]
-    """Complex amplitudes of slopes per wave number, and frequencies: shape (cells, cells)."""
+def _slopes(side: float, cells: int, sea: Sea, variance: float) -> Tile:
+    if variance <= 0:
+        return np.zeros((cells, cells, 2), np.float32)
     k = 2 * np.pi * fft.fftfreq(cells, side / cells)
     kn, ke = np.meshgrid(k, k, indexing="ij")
     size = np.hypot(kn, ke)
     size[0, 0] = 1.0
-    towards = wind_from + np.pi
+    towards = sea.wind_from + np.pi
     along = (kn * np.cos(towards) + ke * np.sin(towards)) / size
-    peak = _GRAVITY / max(wind_speed, 0.5) ** 2  # wave number below which such a wind raises none
+    peak = _GRAVITY / max(sea.wind_speed, 0.5) ** 2  # wave number below which such a wind raises none
     # Slope spectrum of a wind sea: k^-2 per unit area, cut below the peak; most waves run with the wind.
     spectrum = np.exp(-0.7 * (peak / size) ** 2) / size**2 * (0.1 + np.where(along > 0, along**2, 0.05))
     spectrum[0, 0] = 0.0
-    rng = np.random.default_rng([seed, cells])
+    rng = np.random.default_rng([sea.seed, cells])
     noise = rng.standard_normal((cells, cells)) + 1j * rng.standard_normal((cells, cells))
-    return np.sqrt(spectrum) * noise, np.sqrt(_GRAVITY * size), kn / size, ke / size
-
-
-def _slopes(side: float, cells: int, sea: Sea, variance: float, time: float) -> Tile:
-    if variance <= 0:
-        return np.zeros((cells, cells, 2), np.float32)
-    amplitude, frequency, north, east = _amplitudes(side, cells, sea.wind_speed, sea.wind_from, sea.seed)
-    now = amplitude * np.exp(-1j * frequency * time)
-    field_north = fft.ifft2(now * north).real
-    field_east = fft.ifft2(now * east).real
-    size = np.sqrt(field_north.var() + field_east.var())
-    factor = np.sqrt(variance) / size
-    return np.stack([field_north * factor, field_east * factor], axis=-1).astype(np.float32)
+    amplitude = np.sqrt(spectrum) * noise
+    slopes = [fft.ifft2(amplitude * (part / size)).real for part in (kn, ke)]
+    factor = np.sqrt(variance) / np.sqrt(slopes[0].var() + slopes[1].var())
+    return np.stack([one * factor for one in slopes], axis=-1).astype(np.float32)
 
 
 @lru_cache(maxsize=8)
-def tiles_at(sea: Sea, time: float) -> Tiles:
-    """The sea's tiles at a time, s."""
+def tiles_of(sea: Sea) -> Tiles:
+    """The sea's tiles."""
     variance = mean_square_slope(sea.wind_speed)
-    waves = _slopes(*WAVES, sea, 0.4 * variance, time)
-    ripples = _slopes(*RIPPLES, sea, 0.6 * variance, time)
+    waves = _slopes(*WAVES, sea, 0.4 * variance)
+    ripples = _slopes(*RIPPLES, sea, 0.6 * variance)
     return Tiles(waves, ripples, _patches(sea.patches_sd, sea.seed))
 
 
@@ -223,7 +204,7 @@ class RenderedView(NamedTuple):
     seen: tuple[SeenBody, ...]
 
 
-def render(scene: Scene, camera: Camera, p_nc: ArrayLike, R_nc: ArrayLike, time: float = 0.0) -> RenderedView:
+def render(scene: Scene, camera: Camera, p_nc: ArrayLike, R_nc: ArrayLike) -> RenderedView:
     """A scene as a camera sees it.
 
     Parameters
@@ -234,8 +215,6 @@ def render(scene: Scene, camera: Camera, p_nc: ArrayLike, R_nc: ArrayLike, time:
         Intrinsic parameters.
     p_nc, R_nc
         Pose of the camera, (3,) m and (3, 3); the sea is at zero down.
-    time
-        s, for waves and moving bodies.
 
     Returns
     -------
@@ -266,12 +245,10 @@ def render(scene: Scene, camera: Camera, p_nc: ArrayLike, R_nc: ArrayLike, time:
     weather = np.array([sea.temperature, sea.air, sea.zenith, sea.glint])
     scales = np.array([cells / side for side, cells in (WAVES, RIPPLES, PATCHES)])
     focal = float(np.sqrt(camera.fx * camera.fy))
-    kernels.render_sea(
-        rays, p, R, focal, *tiles_at(sea, float(time)), scales, weather, _sun(sea), kelvin, water
-    )
+    kernels.render_sea(rays, p, R, focal, *tiles_of(sea), scales, weather, _sun(sea), kelvin, water)
     labels = np.zeros(kelvin.shape, np.int16)
     places = [p] * len(scene.bodies)
-    seen = draw_bodies(scene.bodies, camera, places, R, time, sea.temperature, kelvin, labels)
+    seen = draw_bodies(scene.bodies, camera, places, R, sea.temperature, kelvin, labels)
     return RenderedView(kelvin, labels, water, seen)
 
 
@@ -306,7 +283,6 @@ def draw_bodies(
     camera: Camera,
     places: Sequence[Array],
     R: Array,
-    time: float,
     temperature: float,
     kelvin: NDArray[np.float32],
     labels: NDArray[np.int16],
@@ -323,8 +299,6 @@ def draw_bodies(
         Of the camera, (3,) m for each body: from where it is seen, if its ground is at zero down.
     R
         (3, 3) attitude of the camera.
-    time
-        s.
     temperature
         What excesses are over, K.
     kelvin, labels
@@ -336,20 +310,20 @@ def draw_bodies(
     """
     seen = []
     # Those whose tops are further away first, so that nearer ones hide them.
-    order = sorted(range(len(bodies)), key=lambda k: -float(np.linalg.norm(bodies[k].top(time) - places[k])))
+    order = sorted(range(len(bodies)), key=lambda k: -float(np.linalg.norm(bodies[k].top - places[k])))
     rays = pixel_coordinates(camera)
     for k in order:
         body, p = bodies[k], places[k]
-        found = outline_of(body, camera, p, R, time)
+        found = outline_of(body, camera, p, R)
         if found is None:
             continue
-        _draw_wake(body, camera, rays, p, R, time, kelvin)
-        covered = _draw(body, camera, rays, p, R, time, found, k + 1, temperature, kelvin, labels)
+        _draw_wake(body, camera, rays, p, R, kelvin)
+        covered = _draw(body, camera, rays, p, R, found, k + 1, temperature, kelvin, labels)
         size = visible_part(found + 0.5, camera.width, camera.height)  # a pixel reaches half a pixel around
         if not size.area > 0:
             continue
         whole = visible_part(found - found.min(axis=0), np.inf, np.inf)
-        uv = ground_to_pixel(camera, body.centre(time)[None], p, R)[0]
+        uv = ground_to_pixel(camera, body.centre[None], p, R)[0]
         seen.append(
             SeenBody(
                 k + 1, body.kind, uv, whole.centre + found.min(axis=0), size.centre - 0.5, found, size.area,
@@ -359,7 +333,7 @@ def draw_bodies(
     return tuple(seen)
 
 
-def outline_of(body: Body, camera: Camera, p: Array, R: Array, time: float = 0.0) -> Array | None:
+def outline_of(body: Body, camera: Camera, p: Array, R: Array) -> Array | None:
     """Convex hull (K, 2) px of a body's projected corners, exact; None where one is behind the camera.
 
     Parameters
@@ -370,16 +344,14 @@ def outline_of(body: Body, camera: Camera, p: Array, R: Array, time: float = 0.0
         Intrinsic parameters.
     p, R
         Pose of the camera, (3,) m and (3, 3).
-    time
-        s.
 
     Returns
     -------
     (K, 2) px in order, or None.
     """
-    corners = np.concatenate([body.corners(layer, time) for layer in body.layers])
+    corners = np.concatenate([body.corners(layer) for layer in body.layers])
     pixels = ground_to_pixel(camera, corners, p, R)
-    return _hull(pixels) if np.isfinite(pixels).all() else None
+    return pixels[ConvexHull(pixels).vertices] if np.isfinite(pixels).all() else None
 
 
 @lru_cache(maxsize=4)
@@ -387,24 +359,6 @@ def pixel_coordinates(camera: Camera) -> NDArray[np.float64]:
     """Normalised coordinates (H, W, 2) of all pixels' centres."""
     v, u = np.mgrid[: camera.height, : camera.width].astype(float)
     return np.ascontiguousarray(normalise(camera, np.stack([u, v], axis=-1)))
-
-
-def _hull(points: Array) -> Array:
-    """Convex hull of points (N, 2) in order, by Andrew's chains."""
-    ordered = points[np.lexsort((points[:, 1], points[:, 0]))]
-
-    def chain(several: Array) -> list[Array]:
-        kept: list[Array] = []
-        for point in several:
-            while len(kept) > 1:
-                a, b = kept[-1] - kept[-2], point - kept[-2]
-                if a[0] * b[1] - a[1] * b[0] > 0:
-                    break
-                kept.pop()
-            kept.append(point)
-        return kept[:-1]
-
-    return np.array(chain(ordered) + chain(ordered[::-1]))
 
 
 def _sun(sea: Sea) -> Array:
@@ -430,9 +384,8 @@ def _texture(seed: int) -> NDArray[np.float32]:
     return np.asarray(field / field.std(), np.float32)
 
 
-def _frame(body: Body, time: float) -> Array:
-    north, east, _ = body.centre(time)
-    return np.array([north, east, np.cos(body.course), np.sin(body.course)])
+def _frame(body: Body) -> Array:
+    return np.array([body.north, body.east, np.cos(body.course), np.sin(body.course)])
 
 
 def _box(pixels: Array, camera: Camera) -> NDArray[np.int64]:
@@ -450,7 +403,6 @@ def _draw(
     rays: Array,
     p: Array,
     R: Array,
-    time: float,
     outline: Array,
     number: int,
     temperature: float,
@@ -480,7 +432,7 @@ def _draw(
     step = np.array([1 / camera.fx, 1 / camera.fy])
     return float(
         kernels.render_body(
-            rays, step, p, R, box, _frame(body, time), np.array(edges), np.array(spans, np.int64),
+            rays, step, p, R, box, _frame(body), np.array(edges), np.array(spans, np.int64),
             np.array([layer.height for layer in body.layers], float), values,
             np.array(hot, float).reshape(-1, 5), _texture(body.texture_seed), temperature, metres, number,
             kelvin, labels,
@@ -507,20 +459,16 @@ def _draw_wake(
     rays: Array,
     p: Array,
     R: Array,
-    time: float,
     kelvin: NDArray[np.float32],
 ) -> None:
     if body.wake is None:
         return
     stern = min(x for layer in body.layers for x, _ in layer.outline)
     half = 2.0 * body.wake.width
-    cos, sin = np.cos(body.course), np.sin(body.course)
-    x = np.array([stern, stern, stern - body.wake.length, stern - body.wake.length])
-    y = np.array([-half, half, half, -half])
-    north, east, _ = body.centre(time)
-    corners = np.stack([north + cos * x - sin * y, east + sin * x + cos * y, np.zeros(4)], axis=1)
+    x = [stern, stern, stern - body.wake.length, stern - body.wake.length]
+    corners = body.place(x, [-half, half, half, -half])
     pixels = ground_to_pixel(camera, corners, p, R)
     everything = np.array([0, camera.height, 0, camera.width], np.int64)
     box = _box(pixels, camera) if np.isfinite(pixels).all() else everything
     wake = np.array([stern, body.wake.length, body.wake.width, body.wake.excess])
-    kernels.render_wake(rays, p, R, box, _frame(body, time), wake, kelvin)
+    kernels.render_wake(rays, p, R, box, _frame(body), wake, kelvin)
