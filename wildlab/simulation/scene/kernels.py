@@ -29,33 +29,50 @@ def sky(up: float, air: float, zenith: float) -> float:
 
 
 @compiled
-def sampled(tile: Array, per_metre: float, north: float, east: float) -> float:
-    """Bilinear value of a tile that repeats; its side is a power of two."""
+def cell(tile: Array, per_metre: float, north: float, east: float) -> tuple[int, int, int, int, float, float]:
+    """Rows i and k, columns j and m of the nodes about a place on a tile that repeats, whose side is a power
+    of two, and how far it is from the first to the second."""
     a, b = north * per_metre, east * per_metre
     fa, fb = np.floor(a), np.floor(b)
-    wa, wb = a - fa, b - fb
     last = tile.shape[0] - 1
     i, j = int(fa) & last, int(fb) & last
-    k, m = (i + 1) & last, (j + 1) & last
+    return i, (i + 1) & last, j, (j + 1) & last, a - fa, b - fb
+
+
+@compiled
+def sampled(tile: Array, per_metre: float, north: float, east: float) -> float:
+    """Bilinear value of a tile."""
+    i, k, j, m, wa, wb = cell(tile, per_metre, north, east)
     low = tile[i, j] + wb * (tile[i, m] - tile[i, j])
     high = tile[k, j] + wb * (tile[k, m] - tile[k, j])
     return float(low + wa * (high - low))
 
 
 @compiled
-def slopes(tile: Array, per_metre: float, north: float, east: float) -> tuple[float, float]:
-    """Bilinear slopes of a tile (n, n, 2) that repeats; its side is a power of two."""
-    a, b = north * per_metre, east * per_metre
-    fa, fb = np.floor(a), np.floor(b)
-    wa, wb = a - fa, b - fb
-    last = tile.shape[0] - 1
-    i, j = int(fa) & last, int(fb) & last
-    k, m = (i + 1) & last, (j + 1) & last
-    w00, w01, w10, w11 = (1 - wa) * (1 - wb), (1 - wa) * wb, wa * (1 - wb), wa * wb
+def channels(tile: Array, per_metre: float, north: float, east: float, out: Array) -> None:
+    """Bilinear values of all channels (n, n, c), as `sampled` gives them one by one."""
+    i, k, j, m, wa, wb = cell(tile, per_metre, north, east)
+    for c in range(tile.shape[2]):
+        low = tile[i, j, c] + wb * (tile[i, m, c] - tile[i, j, c])
+        high = tile[k, j, c] + wb * (tile[k, m, c] - tile[k, j, c])
+        out[c] = low + wa * (high - low)
+
+
+@compiled
+def turned(R: Array, x: float, y: float) -> tuple[float, float, float]:
+    """A direction of depth one in c, in n."""
     return (
-        w00 * tile[i, j, 0] + w01 * tile[i, m, 0] + w10 * tile[k, j, 0] + w11 * tile[k, m, 0],
-        w00 * tile[i, j, 1] + w01 * tile[i, m, 1] + w10 * tile[k, j, 1] + w11 * tile[k, m, 1],
+        R[0, 0] * x + R[0, 1] * y + R[0, 2],
+        R[1, 0] * x + R[1, 1] * y + R[1, 2],
+        R[2, 0] * x + R[2, 1] * y + R[2, 2],
     )
+
+
+@compiled
+def unit(dn: float, de: float, dd: float) -> tuple[float, float, float]:
+    """The same direction with length one."""
+    size = 1 / np.sqrt(dn * dn + de * de + dd * dd)
+    return dn * size, de * size, dd * size
 
 
 @compiled
@@ -71,16 +88,10 @@ def render_sea(
     """
     rows, columns = out.shape
     water, air, zenith, glint = weather
-    R00, R01, R02 = R[0, 0], R[0, 1], R[0, 2]
-    R10, R11, R12 = R[1, 0], R[1, 1], R[1, 2]
-    R20, R21, R22 = R[2, 0], R[2, 1], R[2, 2]
-    near = 18 * sun[3] ** 2
+    near, wave, ripple = 18 * sun[3] ** 2, np.empty(2), np.empty(2)
     for i in range(rows):
         for j in range(columns):
-            x, y = rays[i, j, 0], rays[i, j, 1]
-            dn, de, dd = R00 * x + R01 * y + R02, R10 * x + R11 * y + R12, R20 * x + R21 * y + R22
-            size = 1 / np.sqrt(dn * dn + de * de + dd * dd)
-            dn, de, dd = dn * size, de * size, dd * size
+            dn, de, dd = unit(*turned(R, rays[i, j, 0], rays[i, j, 1]))
             if dd <= 1e-4:
                 out[i, j] = sky(-dd, air, zenith)
                 horizon[i, j] = False
@@ -91,10 +102,10 @@ def render_sea(
             wide = distance / (focal * dd)  # how long a pixel is on the water
             # A pixel averages over what is smaller than itself.
             large, small = wide * scales[0] / 4, wide * scales[1] / 4
-            sn, se = slopes(waves, scales[0], north, east)
-            rn, re = slopes(ripples, scales[1], north, east)
+            channels(waves, scales[0], north, east, wave)
+            channels(ripples, scales[1], north, east, ripple)
             large, small = 1 / (1 + large * large), 1 / (1 + small * small)
-            sn, se = large * sn + small * rn, large * se + small * re
+            sn, se = large * wave[0] + small * ripple[0], large * wave[1] + small * ripple[1]
             norm = 1 / np.sqrt(1 + sn * sn + se * se)
             nn, ne, nd = -sn * norm, -se * norm, -norm
             cos = max(-(dn * nn + de * ne + dd * nd), 0.02)
@@ -133,9 +144,7 @@ def layer_at(
     Seen from above, what meets the higher layer first hides the lower one. ``frame`` (4,) north and east of
     the body, cosine and sine of its course.
     """
-    dn = R[0, 0] * rx + R[0, 1] * ry + R[0, 2]
-    de = R[1, 0] * rx + R[1, 1] * ry + R[1, 2]
-    dd = R[2, 0] * rx + R[2, 1] * ry + R[2, 2]
+    dn, de, dd = turned(R, rx, ry)
     nearest = 1e30
     hit = -1
     for layer in range(len(heights) - 1, -1, -1):
@@ -220,13 +229,11 @@ def render_wake(rays: Array, p: Array, R: Array, box: Array, frame: Array, wake:
     """Adds a wake to ``out``: ``wake`` (4,) where it begins (m ahead of the centre), length, width, K."""
     for i in range(box[0], box[1]):
         for j in range(box[2], box[3]):
-            x, y = rays[i, j, 0], rays[i, j, 1]
-            dd = R[2, 0] * x + R[2, 1] * y + R[2, 2]
+            dn, de, dd = turned(R, rays[i, j, 0], rays[i, j, 1])
             if dd <= 1e-6:
                 continue
             t = -p[2] / dd
-            n = p[0] + t * (R[0, 0] * x + R[0, 1] * y + R[0, 2]) - frame[0]
-            e = p[1] + t * (R[1, 0] * x + R[1, 1] * y + R[1, 2]) - frame[1]
+            n, e = p[0] + t * dn - frame[0], p[1] + t * de - frame[1]
             ahead, right = frame[2] * n + frame[3] * e, -frame[3] * n + frame[2] * e
             behind = wake[0] - ahead
             if behind < 0 or behind > wake[1]:
@@ -240,21 +247,6 @@ def render_wake(rays: Array, p: Array, R: Array, box: Array, frame: Array, wake:
 MOST_STEPS = 4000
 #: How near a ray comes to the ground, m, and after how many refinements of the last step it is near enough.
 CLOSE, REFINEMENTS = 1e-6, 60
-
-
-@compiled
-def channels(tile: Array, per_metre: float, north: float, east: float, out: Array) -> None:
-    """Bilinear values of all channels (n, n, c), as `sampled` gives them one by one."""
-    a, b = north * per_metre, east * per_metre
-    fa, fb = np.floor(a), np.floor(b)
-    wa, wb = a - fa, b - fb
-    last = tile.shape[0] - 1
-    i, j = int(fa) & last, int(fb) & last
-    k, m = (i + 1) & last, (j + 1) & last
-    for c in range(tile.shape[2]):
-        low = tile[i, j, c] + wb * (tile[i, m, c] - tile[i, j, c])
-        high = tile[k, j, c] + wb * (tile[k, m, c] - tile[k, j, c])
-        out[c] = low + wa * (high - low)
 
 
 @compiled
@@ -313,9 +305,7 @@ def meet_all(
 ) -> None:
     """Fills ``out`` (N, 3) with where rays along ``directions`` (N, 3) in n meet the ground; NaN for none."""
     for i in range(len(directions)):
-        dn, de, dd = directions[i, 0], directions[i, 1], directions[i, 2]
-        size = 1 / np.sqrt(dn * dn + de * de + dd * dd)
-        dn, de, dd = dn * size, de * size, dd * size
+        dn, de, dd = unit(directions[i, 0], directions[i, 1], directions[i, 2])
         t = meet(relief, per_metre, lowest, highest, p, dn, de, dd)
         if t < 0:
             out[i] = np.nan
@@ -338,12 +328,7 @@ def render_ground(
     slope, warm = np.empty(3), np.empty(5)
     for i in range(rows):
         for j in range(columns):
-            x, y = rays[i, j, 0], rays[i, j, 1]
-            dn = R[0, 0] * x + R[0, 1] * y + R[0, 2]
-            de = R[1, 0] * x + R[1, 1] * y + R[1, 2]
-            dd = R[2, 0] * x + R[2, 1] * y + R[2, 2]
-            size = 1 / np.sqrt(dn * dn + de * de + dd * dd)
-            dn, de, dd = dn * size, de * size, dd * size
+            dn, de, dd = unit(*turned(R, rays[i, j, 0], rays[i, j, 1]))
             t = meet(relief, scales[0], limits[0], limits[1], p, dn, de, dd)
             ground[i, j] = t >= 0
             if t < 0:
