@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.tracking.poses import GENERATORS
-from wildlab.errors import WildlabError
 from wildlab.tracking.many.tracks import count_interval, count_probabilities
 from wildlab.tracking.motion import constant_velocity, in_steps
 from wildlab.tracking.particles import (
@@ -18,7 +17,6 @@ from wildlab.tracking.particles import (
     effective_size,
     moments,
     move,
-    pick,
     resample,
     start_gaussian,
     stay_inside,
@@ -90,16 +88,6 @@ def uneven(rng, animals, particles):
     return w / w.sum(axis=1, keepdims=True)
 
 
-@given(rng=GENERATORS, animals=st.integers(1, 4), particles=st.integers(2, 60))
-def test_the_compiled_walk_finds_what_a_search_finds(rng, animals, particles):
-    cumulative = np.cumsum(uneven(rng, animals, particles), axis=1)
-    cumulative /= cumulative[:, -1:]
-    points = np.sort(rng.random((animals, particles)), axis=1)
-    points[:, 0] = 0.0
-    wanted = [np.searchsorted(c, p, side="right") for c, p in zip(cumulative, points, strict=True)]
-    np.testing.assert_array_equal(pick(cumulative, points), wanted)
-
-
 def test_copies_are_unbiased(rng):
     """The mean number of copies is N w, within the error of the draws themselves."""
     N, runs = 24, 20_000
@@ -138,12 +126,6 @@ def test_two_thirds_is_the_default_and_one_is_always(rng):
     assert resample(Cloud(np.zeros((2, 9, 2)), w2), rng)[1].tolist() == [True, False]
     assert not resample(Cloud(np.zeros((1, 9, 2)), w), rng)[1].any()
     assert resample(Cloud(np.zeros((1, 9, 2)), w), rng, threshold=1)[1].all()
-
-
-def test_what_there_is_not_is_refused():
-    cloud = Cloud(np.zeros((1, 2, 2)), np.full((1, 2), 0.5))
-    with pytest.raises(WildlabError, match="0 to 1"):
-        resample(cloud, np.random.default_rng(0), 1.2)
 
 
 some = st.lists(st.floats(0, 1), max_size=7)

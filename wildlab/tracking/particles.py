@@ -18,8 +18,7 @@ Particles move by the motion model itself (prior sampling, F (4.15)). F's random
 for each step and holds it over that step, and F does not say how long a step is. The spread after a time
 depends on it: n steps of length T add n (sd T)^2, so ten times as many steps in the same time spread the
 cloud a tenth as far in variance. `walk_of` turns a standard deviation of velocities *and* the step they last
-into a walk that gives the same spread however often it is predicted. The loops that numpy goes through
-several times are compiled.
+into a walk that gives the same spread however often it is predicted.
 """
 
 from __future__ import annotations
@@ -32,7 +31,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.geometry.compilation import compiled
 from wildlab.geometry.covariances import check_covariance, gate_threshold
 from wildlab.geometry.frames import Array
 from wildlab.tracking.association import innovation_squared
@@ -55,69 +53,6 @@ __all__ = [
     "weigh",
     "weigh_unseen",
 ]
-
-
-@compiled
-def pick(cumulative: Array, points: Array) -> NDArray[np.int64]:
-    """Which particle each point falls on: the first whose cumulative weight lies above it.
-
-    Both (A, N) and (A, M), ascending along the last axis, the points in [0, 1) and the last weight 1. One
-    walk along both replaces a search for each point.
-    """
-    rows, wanted = points.shape
-    found = np.empty((rows, wanted), np.int64)
-    for a in range(rows):
-        i = 0
-        for k in range(wanted):
-            while cumulative[a, i] <= points[a, k]:
-                i += 1
-            found[a, k] = i
-    return found
-
-
-@compiled
-def weighted_moments(x: Array, w: Array) -> tuple[Array, Array]:
-    """Means (A, n) and covariances (A, n, n) of particles (A, N, n) with weights (A, N), F (4.12)-(4.13)."""
-    rows, particles, n = x.shape
-    mean, covariance, off = np.zeros((rows, n)), np.zeros((rows, n, n)), np.empty(n)
-    for a in range(rows):
-        for i in range(particles):
-            for c in range(n):
-                mean[a, c] += w[a, i] * x[a, i, c]
-        for i in range(particles):
-            for c in range(n):
-                off[c] = x[a, i, c] - mean[a, c]
-                for d in range(c + 1):
-                    covariance[a, c, d] += w[a, i] * off[c] * off[d]
-        for c in range(n):
-            for d in range(c):
-                covariance[a, d, c] = covariance[a, c, d]
-    return mean, covariance
-
-
-@compiled
-def weighed(w: Array, given: Array) -> tuple[Array, Array, bool]:
-    """New weights (A, N), log evidence (A,), and whether the log likelihoods (A, N) are all known."""
-    rows, particles = w.shape
-    after, log_evidence = w.copy(), np.full(rows, -np.inf)
-    for a in range(rows):
-        top = -np.inf
-        for i in range(particles):
-            if np.isnan(given[a, i]) or given[a, i] == np.inf:
-                return after, log_evidence, False
-            if w[a, i] > 0 and given[a, i] > top:
-                top = given[a, i]
-        if top == -np.inf:
-            continue
-        # The largest one of those that have any weight is taken out, so that the sum is not zero.
-        total = 0.0
-        for i in range(particles):
-            after[a, i] = w[a, i] * np.exp(given[a, i] - top) if w[a, i] > 0 else 0.0
-            total += after[a, i]
-        for i in range(particles):
-            after[a, i] /= total
-        log_evidence[a] = np.log(total) + top
-    return after, log_evidence, True
 
 
 #: Places (..., 2) m -> whether each lies in an enclosure.
@@ -170,11 +105,6 @@ def weigh(cloud: Cloud, log_likelihood: ArrayLike) -> Weighed:
     -------
     Weighed
 
-    Raises
-    ------
-    WildlabError
-        Where a likelihood is NaN or infinite.
-
     Examples
     --------
     >>> cloud = Cloud(np.array([[[0.0, 0.0], [9.0, 0.0]]]), np.array([[0.5, 0.5]]))
@@ -182,15 +112,14 @@ def weigh(cloud: Cloud, log_likelihood: ArrayLike) -> Weighed:
     >>> print(after.w, np.round(np.exp(log_evidence), 3))
     [[0.75 0.25]] [0.6]
     """
-    given = np.broadcast_to(np.asarray(log_likelihood, float), cloud.w.shape)
-    w, log_evidence, known = weighed(np.ascontiguousarray(cloud.w), np.ascontiguousarray(given))
-    if not known:
-        raise WildlabError(
-            "a likelihood is not a number",
-            "give minus infinity for what is impossible",
-            field="log_likelihood",
-        )
-    return Weighed(Cloud(cloud.x, w), log_evidence)
+    given = np.where(cloud.w > 0, log_likelihood, -np.inf)
+    top = given.max(axis=1, initial=-np.inf)
+    possible = top > -np.inf
+    # The largest one is taken out, so that the sum is not zero.
+    w = cloud.w * np.exp(given - np.where(possible, top, 0.0)[:, None])
+    total = np.where(possible, w.sum(axis=1), 1.0)
+    after = np.where(possible[:, None], w / total[:, None], cloud.w)
+    return Weighed(Cloud(cloud.x, after), np.where(possible, np.log(total) + top, -np.inf))
 
 
 def weigh_unseen(cloud: Cloud, detection: ArrayLike) -> Weighed:
@@ -209,21 +138,9 @@ def weigh_unseen(cloud: Cloud, detection: ArrayLike) -> Weighed:
     Weighed
         Its evidence is the probability of seeing nothing of the animal. F lowers the weights without saying
         by how much; what Bayes' rule asks for is the factor one minus the probability of detection.
-
-    Raises
-    ------
-    WildlabError
-        Where a probability is not from 0 to 1.
     """
-    p = np.asarray(detection, float)
-    if not ((p >= 0) & (p <= 1)).all():
-        raise WildlabError(
-            "a probability of detection is not from 0 to 1",
-            "give 0 outside the footprint, and no NaN",
-            field="detection",
-        )
     with np.errstate(divide="ignore"):
-        return weigh(cloud, np.log1p(-p))
+        return weigh(cloud, np.log1p(-np.asarray(detection, float)))
 
 
 def moments(cloud: Cloud) -> tuple[Array, Array]:
@@ -245,8 +162,9 @@ def moments(cloud: Cloud) -> tuple[Array, Array]:
     >>> print(mean, covariance[0, 0, 0])
     [[1. 0.]] 3.0
     """
-    x, w = (np.ascontiguousarray(one, float) for one in cloud)
-    return weighted_moments(x, w)
+    mean = np.einsum("an,anc->ac", cloud.w, cloud.x)
+    off = cloud.x - mean[:, None]
+    return mean, np.swapaxes(off * cloud.w[..., None], 1, 2) @ off
 
 
 def effective_size(w: ArrayLike) -> Array:
@@ -291,31 +209,20 @@ def start_gaussian(mean: ArrayLike, covariance: ArrayLike, particles: int, rng: 
     Raises
     ------
     WildlabError
-        Where there is no particle, or a covariance is none.
+        Where a covariance is none.
     """
     middle = np.atleast_2d(np.asarray(mean, float))
     A, n = middle.shape
     P = np.broadcast_to(np.asarray(covariance, float), (A, n, n))
     check_covariance(P, "covariance")
-    noise = rng.standard_normal((A, _some(particles), n)) @ np.swapaxes(root_of(P), -1, -2)
-    return Cloud(middle[:, None] + noise, even(A, particles))
-
-
-def even(animals: int, particles: int) -> Array:
-    """Equal weights (A, N)."""
-    return np.full((animals, particles), 1.0 / particles)
+    noise = rng.standard_normal((A, particles, n)) @ np.swapaxes(root_of(P), -1, -2)
+    return Cloud(middle[:, None] + noise, np.full((A, particles), 1.0 / particles))
 
 
 def root_of(P: Array) -> Array:
     """A matrix (..., n, n) whose product with its transpose is ``P``; also where ``P`` has no full rank."""
     values, vectors = np.linalg.eigh(P)
     return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0))[..., None, :])
-
-
-def _some(particles: int) -> int:
-    if particles < 1:
-        raise WildlabError(f"{particles} particles", "give at least one for each animal", field="particles")
-    return particles
 
 
 #: F's share of the particles at which SIS resamples, beside (4.14).
@@ -342,16 +249,7 @@ def resample(
     -------
     cloud, resampled
         Where it was resampled, (A,) bool, weights are equal.
-
-    Raises
-    ------
-    WildlabError
-        For a threshold that is not from 0 to 1.
     """
-    if not 0 <= threshold <= 1:
-        raise WildlabError(
-            f"a threshold of {threshold} of the particles", "give 0 to 1, where 1 is SIR", field="threshold"
-        )
     N = cloud.w.shape[1]
     due = effective_size(cloud.w) <= threshold * N * (1 + 1e-9)  # sums are rounded
     if not due.any():
@@ -390,7 +288,8 @@ def draw(w: ArrayLike, rng: np.random.Generator) -> NDArray[np.int64]:
     points = (np.arange(N) + rng.random((A, 1))) / N
     cumulative = np.cumsum(weights, axis=1)
     cumulative /= cumulative[:, -1:]
-    return pick(cumulative, np.minimum(points, np.nextafter(1.0, 0.0)))
+    points = np.minimum(points, np.nextafter(1.0, 0.0))
+    return np.stack([np.searchsorted(*one, "right") for one in zip(cumulative, points, strict=True)])
 
 
 #: Places (..., 2) m -> probability that an image has a detection of an animal that is there.
@@ -461,23 +360,12 @@ def walk_of(sd_velocity: float, step: float) -> Motion:
     Motion
         `wildlab.tracking.motion.random_walk` with the density sd sqrt(step).
 
-    Raises
-    ------
-    WildlabError
-        For a spread below zero, or a step that is not above it.
-
     Examples
     --------
     >>> F, Q = walk_of(0.5, 1.0)(1800.0)  # half an hour at half a metre a second
     >>> print(round(float(np.sqrt(Q[0, 0])), 1))
     21.2
     """
-    if not (sd_velocity >= 0 and 0 < step < np.inf):
-        raise WildlabError(
-            f"velocities of {sd_velocity} m/s that last {step} s",
-            "give zero or more, and more than zero",
-            field="step",
-        )
     return partial(random_walk, density=sd_velocity * float(np.sqrt(step)))
 
 
