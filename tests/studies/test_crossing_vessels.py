@@ -22,8 +22,8 @@ from wildlab.studies.crossing_vessels import (
     dressed,
     gather,
     photograph,
+    run_bank,
     swapped,
-    track,
     wrong_of,
 )
 from wildlab.studies.rules import load_rules
@@ -47,7 +47,7 @@ def flown(flight):
     crossing = Crossing(some, whole.boat[rows], whole.times[kept], whole.truth[:, kept])
     looks = photograph("crossing-vessels", 6, flight, 2)
     appearance = dressed(crossing, looks, 6)
-    banks = {DISTANCE: track(crossing), FEATURES: track(crossing, appearance)}
+    banks = {DISTANCE: run_bank(crossing.detections), FEATURES: run_bank(crossing.detections, appearance)}
     return study.Flown(crossing, looks, banks)
 
 
@@ -65,12 +65,12 @@ def passing(images=600, closest=0.0, noise=0.0, seed=0):
 
 
 def looking(crossing, separation):
-    return Appearance(separation * crossing.boat[:, None].astype(float), np.ones(1), np.ones(1))
+    return Appearance(separation * crossing.boat[:, None].astype(float), np.ones(1))
 
 
 def test_two_far_apart_are_two_tracks_without_a_mistake():
     crossing = passing(closest=400, noise=5)
-    bank = track(crossing)
+    bank = run_bank(crossing.detections)
     assert len(bank.started) == 2
     assert not wrong_of(crossing, bank).any()
     own, nearest = distances_of(crossing, bank)
@@ -92,12 +92,12 @@ def reversing():
 
 def test_who_turns_back_is_swapped_by_distance_and_not_by_looks():
     crossing = reversing()
-    alone = track(crossing)
+    alone = run_bank(crossing.detections)
     assert swapped(crossing, alone) == (True, True)
     wrong = wrong_of(crossing, alone)
     assert 0.4 < wrong.mean() < 0.6
     assert not wrong[: len(wrong) // 2 - 20].any()
-    told_apart = track(crossing, looking(crossing, 20.0))
+    told_apart = run_bank(crossing.detections, looking(crossing, 20.0))
     assert not wrong_of(crossing, told_apart).any()
 
 

@@ -10,11 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from wildlab.geometry.covariances import gate_threshold
 from wildlab.studies.crossing_vessels import (
+    TUNING,
     Appearance,
     ImageDetections,
-    Tuning,
     feature_distances,
     image_features,
     run_bank,
@@ -24,7 +23,6 @@ from wildlab.tracking.run import Start, run_filter
 from wildlab.tracking.sensors import positions
 
 INTERVAL = 0.5
-TUNING = Tuning(17.5, 0.2, 5.0, gate_threshold(0.99, 2), 5.0)
 
 
 def test_of_one_target_it_is_the_single_filter():
@@ -32,7 +30,7 @@ def test_of_one_target_it_is_the_single_filter():
     rng = np.random.default_rng(4)
     image = np.array([3, 4, 5, 6, 7, 9, 10, 40, 41, 90])
     z = np.column_stack([0.1 * image, -0.2 * image]) + rng.normal(0, 10, (len(image), 2))
-    bank = run_bank(ImageDetections(image, z, INTERVAL), TUNING)
+    bank = run_bank(ImageDetections(image, z, INTERVAL))
     assert bank.track.tolist() == [0] * len(image)
     assert np.isnan(bank.x[0]).all()
     motion = partial(
@@ -53,7 +51,7 @@ def test_of_one_target_it_is_the_single_filter():
 
 def test_a_single_detection_starts_nothing_and_neither_do_two_far_apart():
     for image, z in (([1], [[0, 0]]), ([1, 3], [[0, 0], [0, 0]]), ([1, 2], [[0, 0], [500, 0]])):
-        bank = run_bank(ImageDetections(np.array(image), np.array(z, float), INTERVAL), TUNING)
+        bank = run_bank(ImageDetections(np.array(image), np.array(z, float), INTERVAL))
         assert (bank.track == -1).all()
         assert len(bank.started) == 0
 
@@ -62,7 +60,7 @@ def test_two_in_one_image_do_not_go_to_one_track():
     """The second finds the only gate taken: with its like in the next image it starts a track of its own."""
     image = np.array([1, 2, 3, 3, 4, 4])
     z = np.array([[0, 0], [0, 0], [0, 0], [20, 0], [0, 0], [20, 0]], float)
-    bank = run_bank(ImageDetections(image, z, INTERVAL), TUNING)
+    bank = run_bank(ImageDetections(image, z, INTERVAL))
     assert bank.track.tolist() == [0, 0, 0, 1, 0, 1]
     assert bank.started.tolist() == [0, 3]
     assert np.isnan(bank.x[:3, 1]).all() and np.isfinite(bank.x[3, 1]).all()
@@ -72,34 +70,34 @@ def test_what_looks_alike_goes_together_and_the_gate_is_of_the_distance_alone():
     """Two tracks that keep the mean of two first looks each; then both detections lie between the two."""
     image = np.array([1, 1, 2, 2, 3, 3])
     z = np.array([[0, 0], [40, 0], [0, 0], [40, 0], [18, 0], [22, 0]], float)
-    looks = Appearance(np.array([[0.0], [10], [2], [12], [11], [1]]), np.ones(1), np.ones(1))
-    assert run_bank(ImageDetections(image, z, INTERVAL), TUNING).track.tolist() == [0, 1, 0, 1, 0, 1]
-    assert run_bank(ImageDetections(image, z, INTERVAL), TUNING, looks).track.tolist() == [0, 1, 0, 1, 1, 0]
+    looks = Appearance(np.array([[0.0], [10], [2], [12], [11], [1]]), np.ones(1))
+    assert run_bank(ImageDetections(image, z, INTERVAL)).track.tolist() == [0, 1, 0, 1, 0, 1]
+    assert run_bank(ImageDetections(image, z, INTERVAL), looks).track.tolist() == [0, 1, 0, 1, 1, 0]
     far = z + np.array([[0.0, 0]] * 4 + [[0, 500]] * 2)
-    assert run_bank(ImageDetections(image, far, INTERVAL), TUNING, looks).track[4:].tolist() == [-1, -1]
+    assert run_bank(ImageDetections(image, far, INTERVAL), looks).track[4:].tolist() == [-1, -1]
     # What is kept is the mean, 1 and 11, as uncertain as half of a look.
     alike = looks._replace(features=np.array([[0.0], [10], [2], [12], [6.06], [6]]))
-    assert run_bank(ImageDetections(image, z, INTERVAL), TUNING, alike).track[4:].tolist() == [1, 0]
-    alike = alike._replace(weights=np.array([1.5**-0.5]))
-    assert run_bank(ImageDetections(image, z, INTERVAL), TUNING, alike).track[4:].tolist() == [0, 1]
+    assert run_bank(ImageDetections(image, z, INTERVAL), alike).track[4:].tolist() == [1, 0]
+    alike = alike._replace(sd=np.array([1.5**0.25]))
+    assert run_bank(ImageDetections(image, z, INTERVAL), alike).track[4:].tolist() == [0, 1]
 
 
 values = arrays(np.float64, (3, 2), elements=st.floats(-50, 50))
 
 
-@given(values, values, arrays(np.float64, 2, elements=st.floats(0, 3)))
-def test_it_is_the_sum_of_its_features(measured, stored, weights):
+@given(values, values)
+def test_it_is_the_sum_of_its_features(measured, stored):
     sd = np.array([2.0, 0.5])
-    found = feature_distances(measured, stored, sd, weights)
+    found = feature_distances(measured, stored, sd)
     for i, new in enumerate(measured):
         for j, old in enumerate(stored):
-            expected = sum(w * ((a - b) / s) ** 2 for a, b, s, w in zip(new, old, sd, weights, strict=True))
+            expected = sum(((a - b) / s) ** 2 for a, b, s in zip(new, old, sd, strict=True))
             assert found[i, j] == pytest.approx(expected)
 
 
 def test_size_on_the_ground_does_not_depend_on_the_distance():
     near = image_features([400.0], [10.0], [[0.2] + [0.0] * 6], 0.25)
-    far = image_features([100.0], [10.0], [0.2], 0.5)
+    far = image_features([100.0], [10.0], [[0.2]], 0.5)
     assert np.allclose(near, far)
     assert np.allclose(near, [[np.log(25), 10, np.log(0.2)]])
-    assert np.isnan(image_features([0.0], [1.0], [0.0], 1.0)).tolist() == [[True, False, True]]
+    assert np.isnan(image_features([0.0], [1.0], [[0.0]], 1.0)).tolist() == [[True, False, True]]

@@ -16,6 +16,8 @@ from wildlab.geometry.intrinsics import Views
 
 #: How far the margin reaches beyond the outermost squares or circles, in spacings.
 MARGIN = 0.6
+#: Shade all around a board, and rays across each pixel.
+GROUND, SAMPLES = 120.0, 4
 #: Radius of a circle, in spacings.
 RADIUS = 0.28
 
@@ -69,8 +71,6 @@ def board_image(
     circles: bool = False,
     warm: float = 200.0,
     cold: float = 50.0,
-    ground: float = 120.0,
-    samples: int = 4,
 ) -> NDArray[np.float64]:
     """One image without noise: which side of the pattern is the warm one is said by `warm` and `cold`.
 
@@ -86,16 +86,14 @@ def board_image(
         Side of a square, or what the radius of the circles is a share of, metres.
     circles
         Whether the points are centres of circles, else corners of squares.
-    warm, cold, ground
-        Shades: of the margin and every other square, of the others (or the circles), and of all around.
-    samples
-        Rays across each pixel.
+    warm, cold
+        Shades: of the margin and every other square, and of the others (or the circles).
 
     Returns
     -------
     (height, width) shades.
     """
-    step = (np.arange(samples) + 0.5) / samples - 0.5
+    step = (np.arange(SAMPLES) + 0.5) / SAMPLES - 0.5
     low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
     beyond = (MARGIN + (0.0 if circles else 1.0)) * spacing
     u, v = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
@@ -105,20 +103,20 @@ def board_image(
     # The plane z = 0 of the board, R x + t along the ray, solved for x.
     inverse = np.linalg.inv(np.column_stack([rotation[:, :2], translation]))
     tree = KDTree(points[:, :2])
-    image = np.full(len(centre), ground * samples**2)
+    image = np.full(len(centre), GROUND * SAMPLES**2)
     near = _on_board(centre, inverse, low - 2 * beyond, high + 2 * beyond)[1]
     for du in step:
         for dv in step:
             rays = centre[near] + per_pixel[near] @ np.array([du, dv])
             xy, inside = _on_board(rays, inverse, low - beyond, high + beyond)
-            shade = np.full(len(rays), ground)
+            shade = np.full(len(rays), GROUND)
             if circles:
                 hit = tree.query(xy[inside])[0] < RADIUS * spacing
                 shade[inside] = np.where(hit, cold, warm)
             else:
                 shade[inside] = np.where(_cold_square(xy[inside], low, high, spacing), cold, warm)
-            image[near] += shade - ground
-    return image.reshape(camera.height, camera.width) / samples**2
+            image[near] += shade - GROUND
+    return image.reshape(camera.height, camera.width) / SAMPLES**2
 
 
 def _on_board(rays: Array, inverse: Array, low: Array, high: Array) -> tuple[Array, NDArray[np.bool_]]:

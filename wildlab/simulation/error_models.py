@@ -90,13 +90,16 @@ def rounded(values: ArrayLike, step: float) -> Array:
     return np.asarray(np.round(x / step) * step) if step > 0 else x.copy()
 
 
+#: Time that a computer takes for each stamp, s.
+SHORTEST_GAP_S = 1e-3
+
+
 def computer_stamps(
     times: ArrayLike,
     offset: float,
     drift: float,
     latency: float,
     rng: np.random.Generator,
-    shortest_gap: float = 1e-3,
 ) -> Array:
     """Times as a computer stamps them on arrival: a clock that is off and drifts, and a queue (H 2.5.2).
 
@@ -111,8 +114,6 @@ def computer_stamps(
     latency
         Mean delay until the computer looks, s, drawn from an exponential distribution: mostly prompt, now and
         then busy. Nothing overtakes: what arrives behind a late one waits for it.
-    shortest_gap
-        Time the computer takes for each, s.
 
     Returns
     -------
@@ -122,6 +123,6 @@ def computer_stamps(
     if len(t) == 0:
         return t.copy()
     ready = t + rng.exponential(latency, len(t)) if latency > 0 else t
-    turn = shortest_gap * np.arange(len(t))
+    turn = SHORTEST_GAP_S * np.arange(len(t))
     seen = np.maximum.accumulate(ready - turn) + turn
     return np.asarray(seen + offset + drift * (seen - t[0]))

@@ -18,8 +18,8 @@ from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
 from wildlab.simulation.parameters import TwinParameters
 
-#: Between heights of a course that follows the ground, s.
-_EVERY = 1.0
+#: Between heights of a course that follows the ground, and how far beyond the flight they reach, s.
+_EVERY, _MARGIN = 1.0, 30.0
 
 
 def twin_land(twin: TwinParameters) -> Terrain | None:
@@ -69,9 +69,9 @@ def heights_along(twin: TwinParameters, times: Array, north_east: Array, speed: 
     return np.asarray(ndimage.uniform_filter1d(heights, count, mode="nearest"))
 
 
-def even_times(duration: float, margin: float = 30.0) -> Array:
+def even_times(duration: float) -> Array:
     """Times at which heights of a course are taken, s: from some before 0 to some after the duration."""
-    return np.arange(-margin, duration + margin + _EVERY, _EVERY)
+    return np.arange(-_MARGIN, duration + _MARGIN + _EVERY, _EVERY)
 
 
 def land_record(twin: TwinParameters) -> dict[str, object] | None:

@@ -3,8 +3,7 @@
 A bank of Kalman filters on positions with firm association: the tracking system of H 3.3, 3.4 and 6.4.4.
 
 What targets look like helps, H 3.3.1 and 6.4.4: a track keeps what its target looked like at its start. H
-names size, intensity and the first of Hu's invariants, and prints neither weights nor spreads: both are the
-caller's to choose.
+names size, intensity and the first of Hu's invariants, and prints no spreads: they are chosen.
 
 A track starts on detections in two consecutive images that lie near each other (H 6.2.4, 6.4.4) and in no
 gate that has room for them (H 3.3). None ends.
@@ -60,7 +59,7 @@ def image_features(area: ArrayLike, intensity: ArrayLike, hu: ArrayLike, metres_
     intensity
         (N,) mean of each region less the background's, in any unit.
     hu
-        (N, 7) or (N,), of which the first invariant counts.
+        (N, 7), of which the first invariant counts.
     metres_per_px
         (N,) or one: how long a pixel is at the target, m.
 
@@ -72,11 +71,10 @@ def image_features(area: ArrayLike, intensity: ArrayLike, hu: ArrayLike, metres_
 
     Examples
     --------
-    >>> image_features([100.0], [12.0], [0.2], 0.5).round(2).tolist()
+    >>> image_features([100.0], [12.0], [[0.2]], 0.5).round(2).tolist()
     [[3.22, 12.0, -1.61]]
     """
-    first = np.asarray(hu, float)
-    first = first[:, 0] if first.ndim == 2 else first
+    first = np.asarray(hu, float)[:, 0]
     size = np.asarray(area, float) * np.asarray(metres_per_px, float) ** 2
     columns = (
         np.log(np.where(size > 0, size, np.nan)),
@@ -86,11 +84,10 @@ def image_features(area: ArrayLike, intensity: ArrayLike, hu: ArrayLike, metres_
     return np.stack(np.broadcast_arrays(*columns), axis=-1)
 
 
-def feature_distances(measured: ArrayLike, stored: ArrayLike, sd: ArrayLike, weights: ArrayLike) -> Array:
-    """Weighted sum of squared differences of features, each in units of its spread.
+def feature_distances(measured: ArrayLike, stored: ArrayLike, sd: ArrayLike) -> Array:
+    """Sum of squared differences of features, each in units of its spread.
 
-    With all weights 1 and features that are normal and independent it is chi-square, as (3.9) is, so that the
-    two may be added.
+    With features that are normal and independent it is chi-square, as (3.9) is, so that the two may be added.
 
     Parameters
     ----------
@@ -100,8 +97,6 @@ def feature_distances(measured: ArrayLike, stored: ArrayLike, sd: ArrayLike, wei
         (M, f) of tracks.
     sd
         (f,) standard deviation of the difference between a measurement of a target and what its track keeps.
-    weights
-        (f,), not negative; zero leaves a feature out.
 
     Returns
     -------
@@ -110,20 +105,18 @@ def feature_distances(measured: ArrayLike, stored: ArrayLike, sd: ArrayLike, wei
 
     Examples
     --------
-    >>> feature_distances([[3.0, 1.0]], [[1.0, 1.0], [3.0, 4.0]], sd=[1.0, 3.0], weights=[1.0, 0.5]).tolist()
-    [[4.0, 0.5]]
+    >>> feature_distances([[3.0, 1.0]], [[1.0, 1.0], [3.0, 4.0]], sd=[1.0, 3.0]).tolist()
+    [[4.0, 1.0]]
     """
-    new, kept, spread, w = (np.asarray(one, float) for one in (measured, stored, sd, weights))
-    apart = (new[:, None] - kept) / spread
-    return np.asarray(np.where(np.isnan(apart), 0.0, w * apart**2).sum(axis=-1))
+    apart = (np.asarray(measured, float)[:, None] - np.asarray(stored, float)) / np.asarray(sd, float)
+    return np.asarray(np.nansum(apart**2, axis=-1))
 
 
 class Appearance(NamedTuple):
-    """What detections look like, (D, f), with spreads and weights, (f,)."""
+    """What detections look like, (D, f), with spreads, (f,)."""
 
     features: Array
     sd: Array
-    weights: Array
 
 
 class Known(NamedTuple):
@@ -251,15 +244,13 @@ class Bank(NamedTuple):
     P: Array
 
 
-def run_bank(detections: ImageDetections, tuning: Tuning, appearance: Appearance | None = None) -> Bank:
+def run_bank(detections: ImageDetections, appearance: Appearance | None = None) -> Bank:
     """Track everything that was detected.
 
     Parameters
     ----------
     detections
         What was detected.
-    tuning
-        Of the system.
     appearance
         What the detections look like, to be weighed in; by distance alone where it is left out.
 
@@ -272,10 +263,10 @@ def run_bank(detections: ImageDetections, tuning: Tuning, appearance: Appearance
     @cache
     def motion(images: int) -> tuple[Array, Array]:
         """Noise is held over the time between two images, as often as H predicted (6.2)."""
-        held = partial(constant_velocity, sd_acceleration=tuning.acceleration)
+        held = partial(constant_velocity, sd_acceleration=TUNING.acceleration)
         return in_steps(images * detections.interval, held, 1.001 * detections.interval)
 
-    R = tuning.measurement**2 * np.eye(2)
+    R = TUNING.measurement**2 * np.eye(2)
     track = np.full(len(detections.image), -1)
     features = np.empty((len(track), 0)) if appearance is None else appearance.features
     tracks = nobody(features.shape[1])
@@ -290,13 +281,13 @@ def run_bank(detections: ImageDetections, tuning: Tuning, appearance: Appearance
             gap = z[:, None] - x[:, :2]
             distances = innovation_squared(gap, np.broadcast_to(P[:, :2, :2] + R, (*gap.shape, 2)))
             if appearance is None:
-                chosen = global_nearest(distances, tuning.gate)
+                chosen = global_nearest(distances, TUNING.gate)
             else:
                 # What is stored is the mean of two, and as uncertain as half of a detection.
                 sd = np.sqrt(1.5) * appearance.sd
-                seen = feature_distances(features[rows], tracks.stored, sd, appearance.weights)
+                seen = feature_distances(features[rows], tracks.stored, sd)
                 # The gate is one of the distance alone (H 6.4.4).
-                chosen = global_nearest(np.where(distances <= tuning.gate, distances + seen, np.inf), np.inf)
+                chosen = global_nearest(np.where(distances <= TUNING.gate, distances + seen, np.inf), np.inf)
             one = np.flatnonzero(chosen.track >= 0)
             to = chosen.track[one]
             done = update(x[to], P[to], z[one], _H, R)
@@ -306,14 +297,14 @@ def run_bank(detections: ImageDetections, tuning: Tuning, appearance: Appearance
         new = rows[free]
         if len(waiting) and image - before == 1 and len(new):
             old, z = detections.positions[waiting], detections.positions[new]
-            pairs = pair_scans(old, z, detections.interval, R, tuning.max_speed, tuning.gate)
+            pairs = pair_scans(old, z, detections.interval, R, TUNING.max_speed, TUNING.gate)
             for first, at in zip(waiting, pairs.measurement, strict=True):
                 if at < 0:
                     continue
                 two = np.array([first, new[at]])
                 track[two] = len(started)
                 started.append(int(first))
-                fresh = _start(detections.positions[two], features[two], tuning, motion(1))
+                fresh = _start(detections.positions[two], features[two], motion(1))
                 tracks = Known._make(map(np.append, tracks, fresh, [0] * len(fresh)))
             new = new[pairs.track < 0]
         waiting, before = new, image
@@ -325,12 +316,12 @@ def run_bank(detections: ImageDetections, tuning: Tuning, appearance: Appearance
     return Bank(track, np.array(started, int), images, xs, Ps)
 
 
-def _start(z: Array, features: Array, tuning: Tuning, step: tuple[Array, Array]) -> Known:
+def _start(z: Array, features: Array, step: tuple[Array, Array]) -> Known:
     """On the first of two positions with zero speed (H 6.2.4), updated with the second."""
     x = np.concatenate([z[0], np.zeros(2)])
-    P = np.diag([tuning.measurement**2] * 2 + [tuning.velocity_0**2] * 2)
+    P = np.diag([TUNING.measurement**2] * 2 + [TUNING.velocity_0**2] * 2)
     x, P = predict(x, P, *step)
-    done = update(x, P, z[1], _H, tuning.measurement**2 * np.eye(2))
+    done = update(x, P, z[1], _H, TUNING.measurement**2 * np.eye(2))
     parts = done.x, done.P, features.mean(axis=0)
     return Known._make(part[None] for part in parts)
 
@@ -415,9 +406,9 @@ SUBJECTS = (DISTANCE, FEATURES)
 LOOKS = "looks"
 #: H figure 6.21, in its order.
 NAMES = ("size", "intensity", "hu")
-#: Spreads of a detection's features that association is told, in the units of `image_features`, and their
-#: weights. Chosen, once for all flights: about what rendered images of six other flights of the twin had.
-TOLD_SD, WEIGHTS = np.array([0.1, 8.0, 0.05]), np.ones(3)
+#: Spreads of a detection's features that association is told, in the units of `image_features`. Chosen, once
+#: for all flights: about what rendered images of six other flights of the twin had.
+TOLD_SD = np.array([0.1, 8.0, 0.05])
 #: H 6.4.4: positions are mostly within this of the true ones.
 NEAR_M = 20.0
 #: Around a vessel, px: as wide as the longest is in the image, so that the sea about it is rendered too.
@@ -455,7 +446,7 @@ def dressed(crossing: Crossing, looks: list[Array], seed: int) -> Appearance:
         own = np.flatnonzero(crossing.boat == number)
         if len(pool):
             features[own] = pool[rng.integers(len(pool), size=len(own))]
-    return Appearance(features, TOLD_SD, WEIGHTS)
+    return Appearance(features, TOLD_SD)
 
 
 def wrong_of(crossing: Crossing, bank: Bank) -> NDArray[np.bool_]:
@@ -550,13 +541,8 @@ def fly(seed: int, twin: str, images: int, flight: Flight | None = None) -> Flow
     """One simulated flight through every rule; ``flight`` where it is at hand."""
     flight = flight or simulate_twin(twin, seed, ("imu", "gnss"))
     crossing, looks = gather(flight), photograph(twin, seed, flight, images)
-    appearance = dressed(crossing, looks, seed)
-    return Flown(crossing, looks, {DISTANCE: track(crossing), FEATURES: track(crossing, appearance)})
-
-
-def track(crossing: Crossing, appearance: Appearance | None = None) -> Bank:
-    """All detections, tracked with the published tuning; by distance alone without an appearance."""
-    return run_bank(crossing.detections, TUNING, appearance)
+    rules = {DISTANCE: None, FEATURES: dressed(crossing, looks, seed)}
+    return Flown(crossing, looks, {name: run_bank(crossing.detections, how) for name, how in rules.items()})
 
 
 def all_numbers(flown: Flown) -> Numbers:

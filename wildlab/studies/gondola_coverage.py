@@ -150,16 +150,16 @@ def poses_of(
     return camera_on_course(camera_of(twin), there.places, there.headings, angles)
 
 
-def near_cable(land: Terrain, there: Ride, within: float = NEAR) -> NDArray[np.bool_]:
-    """(R, C) bool: nodes so near to the way, over ground."""
+def near_cable(land: Terrain, there: Ride) -> NDArray[np.bool_]:
+    """(R, C) bool: nodes within `NEAR` of the way, over ground."""
     rows, columns = land.height.shape
     close = np.zeros((rows, columns), bool)
-    reach = int(np.ceil(within / land.step))
+    reach = int(np.ceil(NEAR / land.step))
     steps = np.stack(np.meshgrid(*2 * [np.arange(-reach, reach + 1)], indexing="ij"), axis=-1).reshape(-1, 2)
     at = (there.places[:, :2] - (land.north, land.east)) / land.step
     nodes = np.rint(at).astype(int)[:, None] + steps
     far = np.linalg.norm(nodes - at[:, None], axis=-1) * land.step
-    inside = (far <= within) & (nodes >= 0).all(axis=-1) & (nodes < (rows, columns)).all(axis=-1)
+    inside = (far <= NEAR) & (nodes >= 0).all(axis=-1) & (nodes < (rows, columns)).all(axis=-1)
     close[nodes[inside][:, 0], nodes[inside][:, 1]] = True
     return close
 

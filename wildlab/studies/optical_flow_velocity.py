@@ -8,7 +8,7 @@ thing after the other as it truly was.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -57,14 +57,13 @@ class FramePair(NamedTuple):
     matches: Matches
 
 
-@dataclass(frozen=True)
-class Reading:
+class Reading(NamedTuple):
     """How the log of a flight is read for velocities from flow.
 
     Attributes
     ----------
     source
-        Name of the nav table; None where there is only one.
+        Name of the nav table.
     times
         (frames,) s, when the images were really taken, where that is known better than from the stamps.
     camera, mount
@@ -73,7 +72,7 @@ class Reading:
         Down coordinate of what is seen, m.
     """
 
-    source: str | None = None
+    source: str
     times: Array | None = None
     camera: Camera | None = None
     mount: Mount | None = None
@@ -104,28 +103,27 @@ def pair_velocities(
         A row for each pair: ``first`` and ``second`` (rows of the frames), ``time_s`` half way, ``features``,
         measured flow ``flow_u`` and ``flow_v``, that of the camera's own motion ``camera_u`` and ``camera_v``
         (px/s, means over the features), ``v_north_m_s``, ``v_east_m_s`` and their covariance ``cov_nn``,
-        ``cov_ne``, ``cov_ee``. NaN where a pair has no features or no pose.
-
-    Raises
-    ------
-    WildlabError
-        Where the flight has no frames or poses.
+        ``cov_ne``, ``cov_ee``.
     """
     stamps = frame_times(flight) if reading.times is None else reading.times
     rows = np.array([[pair.first, pair.second] for pair in pairs], np.intp).reshape(-1, 2)
     poses = camera_poses_at(flight, stamps, reading.source)
     poses = replace(poses, camera=reading.camera or poses.camera, mount=reading.mount or poses.mount)
     middle = stamps[rows].mean(axis=1)
-    nav, velocities = flight.pose_source(reading.source)[1], None
-    if set(_VELOCITY) <= set(nav.columns):
-        velocities = between(nav["time_s"].to_numpy(float), nav[_VELOCITY].to_numpy(float), middle, "nav")
-    usual = float(np.median(np.diff(stamps))) if len(stamps) > 1 else np.nan
-    found = []
-    for number, pair in enumerate(pairs):
+    nav = flight.nav[reading.source]
+    velocities = between(nav["time_s"].to_numpy(float), nav[_VELOCITY].to_numpy(float), middle, "nav")
+    interval, found = float(np.median(np.diff(stamps))), []
+    for pair, when, velocity in zip(pairs, middle, velocities, strict=True):
         apart = float(stamps[pair.second] - stamps[pair.first])
-        velocity = None if velocities is None else velocities[number]
-        row = _one(flight, poses, pair, (apart, usual), velocity, reading.plane_down)
-        found.append({"first": pair.first, "second": pair.second, "time_s": middle[number], **row})
+        pose, motion = motion_between(poses.take(pair.first), poses.take(pair.second), apart, velocity)
+        matches = pair.matches
+        uv, flow = flow_between(matches.first, matches.second, interval)
+        errors = flow_errors(flight, pose, matches.sd, interval)
+        one = mean_velocity(pose, motion, uv, flow, reading.plane_down, errors)
+        own = camera_flow(pose, motion, uv, reading.plane_down).mean(axis=0)
+        spread = one.covariance[[0, 0, 1], [0, 1, 1]]
+        count = float(len(matches))
+        found.append((pair.first, pair.second, when, count, *flow.mean(axis=0), *own, *one.value, *spread))
     return pd.DataFrame(found, columns=list(_COLUMNS))
 
 
@@ -135,44 +133,15 @@ _COLUMNS = (
 )  # fmt: skip
 
 
-def _one(
-    flight: Flight,
-    poses: CameraPoses,
-    pair: FramePair,
-    times: tuple[float, float],
-    velocity: Array | None,
-    plane_down: float,
-) -> dict[str, float]:
-    """A row of `pair_velocities`; ``times`` are those between the two poses, and between the two images."""
-    row = dict.fromkeys(_COLUMNS[4:], np.nan) | {"features": float(len(pair.matches))}
-    one, two = poses.take(pair.first), poses.take(pair.second)
-    if (
-        not (times[0] > 0 and times[1] > 0)
-        or not np.isfinite(one.R_nc + two.R_nc + one.p_nc + two.p_nc).all()
-    ):
-        return row
-    pose, motion = motion_between(one, two, times[0], velocity)
-    if not len(pair.matches) or not np.isfinite(motion.velocity).all():
-        return row
-    uv, flow = flow_between(pair.matches.first, pair.matches.second, times[1])
-    row["flow_u"], row["flow_v"] = flow.mean(axis=0)
-    row["camera_u"], row["camera_v"] = camera_flow(pose, motion, uv, plane_down).mean(axis=0)
-    errors = flow_errors(flight, pose, pair.matches.sd, times[1])
-    found = mean_velocity(pose, motion, uv, flow, plane_down, errors)
-    row["v_north_m_s"], row["v_east_m_s"] = found.value
-    row["cov_nn"], row["cov_ne"], row["cov_ee"] = found.covariance[[0, 0, 1], [0, 1, 1]]
-    return row
-
-
 def flow_errors(flight: Flight, pose: CameraPoses, sd: float, interval: float) -> FlowErrors:
-    """Covariances of what a velocity is computed from: the log's, the manifest's, else the usual ones.
+    """Covariances of what a velocity is computed from: the manifest's, else the usual ones.
 
     Parameters
     ----------
     flight
         With its manifest.
     pose
-        One; its covariance where the log has one.
+        One.
     sd
         Of a feature's displacement, px: see `wildlab.detection.flow.Matches`.
     interval
@@ -183,18 +152,14 @@ def flow_errors(flight: Flight, pose: CameraPoses, sd: float, interval: float) -
     FlowErrors
     """
     stated, usual = assumed_deviations(flight), USUAL_MOTION
-    covariance = pose.covariance
-    if covariance is None:
-        covariance = assumed_pose_covariance(pose.R_nb, stated)
-    moving = flight.gimbal is not None
     return FlowErrors(
         pixel=np.eye(2) * sd**2,
         flow=np.eye(2) * (sd / interval) ** 2,
-        pose=covariance,
+        pose=assumed_pose_covariance(pose.R_nb, stated),
         mount=np.eye(3) * np.radians(stated["misalignment_deg"]) ** 2,
         velocity=np.eye(3) * usual["velocity_m_s"] ** 2,
         rates=np.eye(3) * np.radians(usual["rate_deg_s"]) ** 2,
-        gimbal_rates=np.eye(2) * (np.radians(usual["gimbal_rate_deg_s"]) if moving else 0.0) ** 2,
+        gimbal_rates=np.eye(2) * np.radians(usual["gimbal_rate_deg_s"]) ** 2,
         plane=stated["plane_height_m"] ** 2,
     )
 
@@ -322,8 +287,8 @@ def readings(looked: Looked) -> dict[str, pd.DataFrame]:
     logged = Reading(AUTOPILOT)
     ways = {
         LOGGED: (looked.flight, logged),
-        SYNCHRONISED: (looked.flight, replace(logged, times=times)),
-        STILL: (known, replace(logged, times=times)),
+        SYNCHRONISED: (looked.flight, logged._replace(times=times)),
+        STILL: (known, logged._replace(times=times)),
         TRUE: (known, Reading(TRUTH, times=times, camera=poses.camera, mount=poses.mount)),
     }
     return {name: pair_velocities(flight, looked.pairs, way) for name, (flight, way) in ways.items()}

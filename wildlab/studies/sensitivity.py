@@ -79,9 +79,7 @@ def displacement(
     return np.asarray(wrong - ground(euler, p_nb))
 
 
-def helgesen_tables(
-    camera: Camera = TAU2, mount: Mount | None = None, uv: tuple[float, float] = IMAGE_CENTRE
-) -> dict[str, float]:
+def helgesen_tables(camera: Camera = TAU2, mount: Mount | None = None) -> dict[str, float]:
     """The 42 numbers of H tables 5.1-5.3: horizontal error (metres) by ``attitude/offset/altitude``."""
     mount = helgesen_mount() if mount is None else mount
     table = {}
@@ -91,7 +89,7 @@ def helgesen_tables(
                 shift = displacement(
                     camera,
                     mount,
-                    uv,
+                    IMAGE_CENTRE,
                     np.radians(euler_deg),
                     (0.0, 0.0, -altitude),
                     np.radians(offset[:3]),

@@ -164,7 +164,7 @@ def association_probabilities(weights: ArrayLike, missed: ArrayLike, most: int =
     Raises
     ------
     WildlabError
-        Where the shapes do not fit, a weight is negative or not finite, or a target has no way at all.
+        Where a target has no way at all.
 
     Examples
     --------
@@ -176,13 +176,6 @@ def association_probabilities(weights: ArrayLike, missed: ArrayLike, most: int =
            [0.1 , 0.09, 0.81]])
     """
     w, w0 = np.asarray(weights, float), np.asarray(missed, float)
-    if w.ndim != 2 or w0.shape != w.shape[:1]:
-        raise WildlabError(
-            f"weights of shape {w.shape} and {w0.shape} do not fit",
-            "give (targets, measurements) and (targets,)",
-        )
-    if not (np.isfinite(w).all() and np.isfinite(w0).all() and (w >= 0).all() and (w0 >= 0).all()):
-        raise WildlabError("a weight is negative or not a number", "give weights from zero up")
     found = np.zeros((len(w), 1 + w.shape[1]))
     linked = w > 0
     rows, columns = (np.flatnonzero(linked.any(axis=axis)) for axis in (1, 0))
@@ -286,15 +279,8 @@ def belief_propagation(weights: ArrayLike, missed: ArrayLike) -> Array:
     Returns
     -------
     (T, 1 + M), rows sum to one.
-
-    Raises
-    ------
-    WildlabError
-        Where a target cannot be missed: the messages would not settle.
     """
     w, w0 = np.asarray(weights, float), np.asarray(missed, float)
-    if not (w0 > 0).all():
-        raise WildlabError("a target in a large cluster cannot be missed", "give it a weight of being missed")
     odds = w / w0[:, None]
     free = np.ones_like(odds)  # from each measurement to each target: how free it is
     for _ in range(MOST_ROUNDS):

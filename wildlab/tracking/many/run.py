@@ -30,7 +30,6 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.spatial import cKDTree
 
-from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.tracking.association import association_probabilities
 from wildlab.tracking.kalman import fade
@@ -218,11 +217,6 @@ def run_many(
     -------
     list[Shown]
         One for each scan, in order of time.
-
-    Raises
-    ------
-    WildlabError
-        Where a scan has no time, is of a sensor that is not there, or shares other errors than are given.
     """
     return [shown for _, shown in follow_many(scans, sensors, targets, lasting_s)]
 
@@ -244,27 +238,8 @@ def follow_many(
     -------
     Iterator of Tracks, Shown
         After each scan, in order of time.
-
-    Raises
-    ------
-    WildlabError
-        As `run_many`.
     """
     eyes = tuple(sensors)
-    for scan in scans:
-        if not np.isfinite(scan.time):
-            raise WildlabError("a scan has no time", "leave it out, or give it one")
-        if not 0 <= scan.sensor < len(eyes):
-            raise WildlabError(
-                f"a scan is of sensor {scan.sensor}, and there are {len(eyes)}", "name them all"
-            )
-        if scan.shared is not None and scan.shared.shape != (*np.shape(scan.z), len(lasting_s)):
-            raise WildlabError(
-                f"shared errors of shape {scan.shared.shape} of {len(scan.z)} measurements of a scan",
-                f"give (M, 2, {len(lasting_s)}), and in lasting_s how long each lasts", field="shared",
-            )  # fmt: skip
-    if not all(one >= 0 for one in lasting_s):
-        raise WildlabError("a shared error lasts for less than nothing", "give seconds", field="lasting_s")
     lasting_s = (*lasting_s, *own_lasting(eyes))
     tracks, first, before = no_tracks(len(targets.hulls), len(eyes), len(lasting_s)), 0, None
     looked: dict[int, float] = {}

@@ -23,7 +23,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
-from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array, wrap
 from wildlab.tracking.kalman import fade
 from wildlab.tracking.many.target_model import (
@@ -146,23 +145,12 @@ def count_probabilities(existence: ArrayLike) -> Array:
     -------
     (K,) of 0 to K - 1 animals; sums to one.
 
-    Raises
-    ------
-    WildlabError
-        Where a probability is not from 0 to 1.
-
     Examples
     --------
     >>> print(count_probabilities([0.5, 1.0]))
     [0.  0.5 0.5]
     """
     r = np.asarray(existence, float).reshape(-1)
-    if not ((r >= 0) & (r <= 1)).all():
-        raise WildlabError(
-            f"no count from probabilities {np.round(r, 3).tolist()}",
-            "give probabilities from 0 to 1",
-            field="existence",
-        )
     p = np.ones(1)
     for one in r:
         p = np.convolve(p, [1 - one, one])
@@ -183,20 +171,11 @@ def count_interval(probabilities: ArrayLike, probability: float = 0.9) -> Count:
     -------
     Count
 
-    Raises
-    ------
-    WildlabError
-        For a probability outside (0, 1).
-
     Examples
     --------
     >>> count_interval(count_probabilities([0.9, 0.8, 0.05]), 0.9)
     Count(mean=1.75, low=1, high=2, probability=0.945)
     """
-    if not 0 < probability < 1:
-        raise WildlabError(
-            f"an interval of probability {probability}", "give above 0 and below 1", field="probability"
-        )
     p = np.asarray(probabilities, float)
     below = np.concatenate([[0.0], np.cumsum(p)])
     held = below[None, 1:] - below[:-1, None]  # from a row's number to a column's
