@@ -14,9 +14,8 @@ the border, that is ``a - i`` only if ``a`` is the full major axis.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -62,6 +61,10 @@ class CentreErrors:
     adjusted: float = 0.1
 
 
+#: As they were set.
+USUAL = CentreErrors()
+
+
 def cut_sides(box: NDArray[Any], shape: tuple[int, ...]) -> Mask:
     """Which borders of an image of that shape (rows, columns) a box touches: left, top, right, bottom.
 
@@ -89,11 +92,12 @@ def cut_sides(box: NDArray[Any], shape: tuple[int, ...]) -> Mask:
 
 def centre_covariance(
     area: float,
-    region: Array,
+    axes: Array,
+    angle: float,
     boundary: Array,
     cut: Mask,
     smoothing_sd: float,
-    errors: CentreErrors,
+    errors: CentreErrors = USUAL,
 ) -> Array:
     """Covariance (2, 2) of an object's centre, px^2: from its shape, the blur, and the border of the image.
 
@@ -105,8 +109,10 @@ def centre_covariance(
     ----------
     area
         px^2.
-    region, boundary
-        (2, 2) each: `Shape.covariance`, and what `wildlab.detection.centres.boundary_spread` gives.
+    axes, angle
+        Of the ellipse with the same second moments: (2,) full lengths, px, and orientation, rad.
+    boundary
+        (2, 2) from :func:`boundary_spread`.
     cut
         (4,) from :func:`cut_sides`.
     smoothing_sd
@@ -121,107 +127,21 @@ def centre_covariance(
     blur = float(np.hypot(smoothing_sd, 1.0))
     pieces = 2 * np.sqrt(np.pi) * blur  # over which a Gaussian blur makes the contour lie alike
     contour = (errors.edge * blur) ** 2 * pieces / area**2 * boundary
-    ellipse = 4 * np.pi * np.sqrt(max(float(np.linalg.det(region)), 1e-12))
-    line = errors.broken * max(FILLED - area / ellipse, 0.0) * float(axes_of(region)[0][0])
+    ellipse = max(np.pi / 4 * float(axes.prod()), 1e-6)
+    line = errors.broken * max(FILLED - area / ellipse, 0.0) * float(axes[0])
     even = (errors.floor**2 + line**2) * np.eye(2)
-    return np.asarray(contour + errors.shape**2 * region + even + hidden_part(region, cut, errors))
+    looks = errors.shape**2 * ellipse_covariance(axes, angle)
+    return np.asarray(contour + looks + even + hidden_part(axes, angle, cut, errors))
 
 
-def hidden_part(region: Array, cut: Mask, errors: CentreErrors) -> Array:
-    """What the border of the image adds to the covariance of a centre (2, 2), px^2; zero for what is whole.
-
-    Parameters
-    ----------
-    region
-        (2, 2) covariance of the points of the visible part, px^2.
-    cut
-        (4,) from :func:`cut_sides`.
-    errors
-        CentreErrors.
-
-    Returns
-    -------
-    (2, 2).
-    """
+def hidden_part(axes: Array, angle: float, cut: Mask, errors: CentreErrors = USUAL) -> Array:
+    """What the border of the image adds to :func:`centre_covariance` (2, 2), px^2; zero for what is whole."""
     if not cut.any():
         return np.zeros((2, 2))
     across = np.diag(np.array([cut[0] or cut[2], cut[1] or cut[3]], float))
     # Along its own axes, and across the border: a ship of which a corner shows lies any way.
-    major = float(axes_of(region)[0][0])
-    return np.asarray(errors.cut**2 * (16 * region + 0.25 * major**2 * across))
-
-
-#: Variance of a point within a pixel, px^2, along either side.
-WITHIN_PIXEL = 1 / 12
-
-
-class Shape(NamedTuple):
-    """A region's shape.
-
-    Attributes
-    ----------
-    area
-        px^2.
-    centre
-        (2,) u and v, px.
-    covariance
-        (2, 2) of the points of the region, H (4.6) divided by the area, px^2.
-    axes
-        (2,) full lengths of the ellipse with that covariance, px.
-    orientation
-        Of the major axis, from u towards v, within a quarter turn of u, rad.
-    hu
-        (7,) invariants under translation, rotation and scale.
-    """
-
-    area: float
-    centre: Array
-    covariance: Array
-    axes: Array
-    orientation: float
-    hu: Array
-
-
-def axes_of(covariance: Array) -> tuple[Array, float]:
-    """Full axes (2,) and orientation of the ellipse whose points have that covariance (2, 2).
-
-    Eigenvectors of H (4.6). The points of an ellipse with full axis ``a`` have the variance ``a^2 / 16``.
-
-    Examples
-    --------
-    >>> axes, angle = axes_of(np.diag([1.0, 4.0]))
-    >>> axes.tolist(), round(angle, 4)
-    ([8.0, 4.0], 1.5708)
-    """
-    a, b, c = covariance[0, 0], covariance[0, 1], covariance[1, 1]
-    middle, half = (a + c) / 2, float(np.hypot((a - c) / 2, b))
-    sizes = np.array([middle + half, max(middle - half, 0.0)])
-    angle = 0.5 * float(np.arctan2(2 * b, a - c))
-    return 4 * np.sqrt(sizes), angle
-
-
-def shape_of(mask: NDArray[Any], left: int = 0, top: int = 0) -> Shape:
-    """The shape of a region.
-
-    Parameters
-    ----------
-    mask
-        (H, W), nonzero inside; a part of an image.
-    left, top
-        Where in the image that part begins, px.
-
-    Returns
-    -------
-    Shape
-    """
-    found = cv2.moments(np.ascontiguousarray(mask, np.uint8), binaryImage=True)
-    area = found["m00"]
-    centre = np.array([found["m10"], found["m01"]]) / area
-    second = np.array([[found["mu20"], found["mu11"]], [found["mu11"], found["mu02"]]]) / area
-    covariance = second + WITHIN_PIXEL * np.eye(2)
-    axes, orientation = axes_of(covariance)
-    hu = np.asarray(cv2.HuMoments(found), float).ravel()
-    return Shape(area, centre + np.array([left, top]), covariance, axes, orientation, hu)
+    whole = 16 * ellipse_covariance(axes, angle)
+    return np.asarray(errors.cut**2 * (whole + 0.25 * axes[0] ** 2 * across))
 
 
 def boundary_spread(outline: NDArray[Any], centre: Array) -> Array:
@@ -288,18 +208,19 @@ def adjust_at_border(
 
     """
     lengths = np.broadcast_to(np.asarray(length, float), len(detections))
-    given = CentreErrors()
     moves = border_moves(detections, shape, lengths)
     uv, covariance = detections.uv.copy(), detections.covariance.copy()
     moved = np.isfinite(moves).all(axis=1)
     uv[moved] += moves[moved]
     for row in np.flatnonzero(moved):
         along = direction(detections.orientation[row])
-        region = ellipse_covariance(detections.axes[row], detections.orientation[row])
+        ellipse = detections.axes[row], float(detections.orientation[row])
         # The hidden part is known but for the length; how far the blob reaches behind its centre is not read
         # off the image but from its second moments, which for other shapes than an ellipse are some way off.
-        without = covariance[row] - hidden_part(region, cut_sides(detections.box[row], shape), given)
-        left = (4 * given.adjusted) ** 2 * region + (length_sd / 2) ** 2 * np.outer(along, along)
+        without = covariance[row] - hidden_part(*ellipse, cut_sides(detections.box[row], shape))
+        left = (4 * USUAL.adjusted) ** 2 * ellipse_covariance(*ellipse) + (length_sd / 2) ** 2 * np.outer(
+            along, along
+        )
         covariance[row] = without + left
     return replace(detections, uv=uv, covariance=covariance)
 

@@ -11,7 +11,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
 
 import cv2
@@ -20,13 +20,11 @@ from numpy.typing import NDArray
 
 from wildlab.detection.centres import (
     AT_BORDER,
-    CentreErrors,
     boundary_spread,
     centre_covariance,
     cut_sides,
-    shape_of,
 )
-from wildlab.detection.detections import Detections
+from wildlab.detection.detections import Detections, describe, no_detections
 from wildlab.errors import WildlabError, above_zero
 from wildlab.geometry.frames import Mask
 
@@ -134,7 +132,7 @@ def find_objects(
     labels = np.zeros(filled.shape, np.int32)
     for number, found in enumerate(objects, start=1):
         labels[found.here][found.mask > 0] = number
-    return FloatingObjects(_described(np.asarray(image), steps, edges, objects, given), labels)
+    return FloatingObjects(_described(np.asarray(image), steps, edges, objects, labels, given), labels)
 
 
 class _Region(NamedTuple):
@@ -335,29 +333,30 @@ def _described(
     steps: Steps,
     edges: NDArray[np.uint8],
     objects: list[_Region],
+    labels: NDArray[np.int32],
     thresholds: FloatingThresholds,
 ) -> Detections:
     """Features of the objects, in their order."""
-    n = len(objects)
-    uv, axes, covariance = np.empty((n, 2)), np.empty((n, 2)), np.empty((n, 2, 2))
-    area, intensity, orientation, score = (np.empty(n) for _ in range(4))
-    hu = np.empty((n, 7))
-    for row, (box, here, mask, outline) in enumerate(objects):
-        shape = shape_of(mask, box[0], box[1])
-        uv[row], axes[row], hu[row] = shape.centre, shape.axes, shape.hu
-        area[row], orientation[row] = shape.area, shape.orientation
-        intensity[row] = cv2.mean(image[here], mask)[0]
-        score[row] = cv2.mean(steps.gradient[here], mask & edges[here])[0] / thresholds.gradient
-        covariance[row] = centre_covariance(
-            shape.area,
-            shape.covariance,
-            boundary_spread(outline, shape.centre),
-            cut_sides(np.array(box), image.shape),
+    if not objects:
+        return no_detections()
+    score = [
+        cv2.mean(steps.gradient[here], mask & edges[here])[0] / thresholds.gradient
+        for _, here, mask, _ in objects
+    ]
+    found = describe(
+        labels, image, np.ones(labels.shape, bool), contrast=steps.gradient, part=0.0, score=score
+    )
+    covariance = [
+        centre_covariance(
+            area, axes, angle, boundary_spread(outline, uv), cut_sides(np.array(box), image.shape),
             thresholds.smoothing_sd,
-            CentreErrors(),
         )
-    box_table = np.array([found.box for found in objects], float).reshape(-1, 4)
-    return Detections(uv, covariance, area, intensity, box_table, axes, orientation, hu, score)
+        for area, axes, angle, uv, (box, _, _, outline) in zip(
+            found.area, found.axes, found.orientation, found.uv, objects, strict=True
+        )
+    ]  # fmt: skip
+    boxes = np.array([one.box for one in objects], float)
+    return replace(found, covariance=np.array(covariance), box=boxes)
 
 
 #: What H prints of the detector's numbers; the others it leaves open.
