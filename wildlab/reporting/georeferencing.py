@@ -651,7 +651,6 @@ def show_repeats(report: Report, flight: Flight, found: Repeats, amiss: Sequence
         gain = diagnosis.winner.gain.gain
         n = len(diagnosis.scored)
         report.metric("sighting_gain", "winner", gain.estimate, "m", n=n, low=gain.low, high=gain.high)
-        report.metric("cause_certain", "winner", float(diagnosis.counts), "1", n=n)
         if diagnosis.winner.causes:
             cause.table("parameters", parameters_table(report, diagnosis.calibration))
     report.limits([wording.say(one) for one in texts.limits])

@@ -269,7 +269,6 @@ def record(report: Report, overview: Overview, gains: Sequence[Gain], counts: Ma
         note("images_with_pose", 1 - _without_pose(overview) / frames, "1", frames)
     if overview.coverage is not None and overview.coverage.placed.any():
         note("area_seen", overview.coverage.area_m2, "m^2", int(overview.coverage.placed.sum()))
-        note("images_per_place", overview.coverage.looks, "1")
     seen, images, placed = overview.detections
     in_images = overview.detections_in_images
     for name, count, n, told in (
@@ -283,7 +282,6 @@ def record(report: Report, overview: Overview, gains: Sequence[Gain], counts: Ma
             note(name, count, "1", n)
     if overview.vibration is not None:
         worst = overview.vibration[0].max(axis=1)
-        note("shaking_median", float(np.median(worst)), "m/s^2", len(worst))
         note("shaking_max", float(worst.max()), "m/s^2", len(worst))
     for trouble in overview.troubles:
         report.metric("trouble", trouble.what.replace(" ", "-"), trouble.seconds, "s", n=len(trouble.spells))
