@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
+from types import MappingProxyType, SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from wildlab.reporting import georeferencing
-from wildlab.reporting.georeferencing import EXACT, truth_kinds
+from wildlab.reporting.georeferencing import truth_errors
 
 
 def test_names_that_may_tell_of_a_place_are_numbered_unless_it_is_open():
@@ -32,15 +32,15 @@ def scored(*names):
     return pd.DataFrame({"truth_id": names})
 
 
-def test_points_are_counted_by_what_they_are_compared_with():
-    assert truth_kinds(flown(), scored("walker", "walker", "m1"))[:2] == (1, 2)
-    assert truth_kinds(flown(), scored("m1", "m1", "m2"))[:2] == (3, 0)
-    reported = truth_kinds(flown(sd_horizontal_m=[0.02, np.nan, 1.4, 1.6]), scored("walker", "m1"))
-    assert reported[2:] == (0.02, pytest.approx(1.5))
-    assert truth_kinds(flown("twin"), scored("walker")) == EXACT
+def test_a_truth_s_own_error_is_that_of_what_points_are_compared_with():
+    assert set(truth_errors(flown(), scored("walker", "walker", "m1"))) == {"mark", "track"}
+    assert np.isnan(truth_errors(flown(), scored("m1", "m1", "m2")).pop("mark"))
+    reported = truth_errors(flown(sd_horizontal_m=[0.02, np.nan, 1.4, 1.6]), scored("walker", "m1"))
+    assert reported == {"mark": 0.02, "track": pytest.approx(1.5)}
+    assert truth_errors(flown("twin"), scored("walker")) == {}
 
 
-def limits_with(offset=0.0, kind="logged", truth=EXACT, certain=False, halves=False, lost=0):
+def limits_with(offset=0.0, kind="logged", truth=MappingProxyType({}), certain=False, halves=False, lost=0):
     manifest = SimpleNamespace(
         kind=kind, clocks=SimpleNamespace(camera_offset_s=offset), time=SimpleNamespace(kind="utc"),
         vertical=SimpleNamespace(correction_m=0.0),

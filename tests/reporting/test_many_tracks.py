@@ -111,7 +111,7 @@ FEW = {0: TrackLife(9, 4, 9.0, False, 4), 1: TrackLife(9, 9, np.nan, False, 0)}
 def test_numbers_of_the_summary():
     assert page.rms_error(lives()) == pytest.approx(3.0)
     assert page.on_target(lives()) == 2 * 61
-    assert page.counts_of(followed()) == (2, 2.0)
+    assert page.count_tracks(followed()) == 2
     none = gospa([[0.0, 0.0]], np.empty((0, 2)), 20.0)
     never = lives(gospa=[none] * 61, targets={"a": TargetLife(61, 0.0, np.nan, 0, 0)})
     assert page.on_target(never) == 0 and np.isnan(page.rms_error(never))

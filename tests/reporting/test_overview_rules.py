@@ -10,8 +10,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wildlab.analysis.overview import Alarm, Issue
-from wildlab.analysis.verdict import Gain, Verdict
+from wildlab.analysis.overview import (
+    APART_M,
+    APART_SD,
+    APART_SHARE,
+    JUMP,
+    JUMP_M,
+    LEANT_DEG,
+    Alarm,
+    Issue,
+)
+from wildlab.analysis.verdict import LISTED, WORTH, Gain, Verdict
+from wildlab.evaluation.streams import FINE, FLOOR_HZ, HARMFUL
+from wildlab.flight.clocks import MAX_GAP_S, USUAL_STEPS
 from wildlab.messages.catalogue import load_texts
 from wildlab.reporting import overview as page
 from wildlab.reporting.overview import Judged
@@ -131,3 +142,11 @@ def test_every_sentence_has_its_words_and_every_word_its_sentence():
         assert set(re.findall(r"{(\w+)}", TEXTS[one.key])) <= set(one.values), one.key
     rest = set(TEXTS) - {one.key for one in said}
     assert all(key.startswith(("reason-", "limit-")) for key in rest), rest
+
+
+def test_the_method_names_the_constants_that_are_used():
+    said = [float(one) for one in re.findall(r"[\d.]*\d", load_texts("overview").method)]
+    assert said == [
+        *(MAX_GAP_S, USUAL_STEPS, JUMP, JUMP_M, LEANT_DEG, HARMFUL, APART_M, APART_SD, 100 * APART_SHARE),
+        *(FLOOR_HZ, FINE, HARMFUL, 100 * LISTED, 100 * WORTH),
+    ]

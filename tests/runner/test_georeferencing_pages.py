@@ -10,7 +10,7 @@ from wildlab.flight.store import save_flight
 
 @pytest.mark.slow
 @pytest.mark.parametrize("sensitivity", ["open", "withheld"])
-def test_what_does_not_fit_together_is_shown_only_where_places_are_open(tmp_path, sensitivity):
+def test_what_does_not_fit_together_is_said_and_names_no_place(tmp_path, sensitivity):
     flight = simulate(Survey(images=8))
     changes = {"mount": {"tilt_deg": 120.0}, "locations": {"sensitivity": sensitivity}}
     flight.manifest = replace_in_manifest(flight.manifest, changes)
@@ -21,5 +21,7 @@ def test_what_does_not_fit_together_is_shown_only_where_places_are_open(tmp_path
     )
     text = "".join(str(one.get("text/html", "")) for one in shown)
     assert 'class="summary bad"' in text and "40 points" in text
-    # What the check proposes.
-    assert ("-90 deg" in text) == (sensitivity == "open")
+    # What the check proposes; where the flight was is nowhere.
+    origin = flight.manifest.origin
+    assert "-90 deg" in text
+    assert not any(f"{one:.3f}" in text for one in (origin.latitude_deg, origin.longitude_deg))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -147,21 +147,9 @@ def named(tables: Mapping[str, pd.DataFrame], kind: str, *, shown: bool) -> dict
 # -- what follows from it
 
 
-class TruthKinds(NamedTuple):
-    """How many points are compared with a mark and with a track, and the reported SD of each (m, or NaN)."""
-
-    marked: int
-    tracked: int
-    mark_sd_m: float
-    track_sd_m: float
-
-
-#: A simulated flight's truth is exact.
-EXACT = TruthKinds(0, 0, np.nan, np.nan)
-
-
-def truth_kinds(flight: Flight, scored: pd.DataFrame) -> TruthKinds:
-    """What the points of a flight are compared with; `EXACT` for a simulated flight.
+def truth_errors(flight: Flight, scored: pd.DataFrame) -> dict[str, float]:
+    """Reported SD (m, or NaN) of the "track" and "mark" that points are compared with, of those there are;
+    a simulated flight's truth is exact.
 
     Parameters
     ----------
@@ -171,20 +159,13 @@ def truth_kinds(flight: Flight, scored: pd.DataFrame) -> TruthKinds:
         From `wildlab.analysis.georeference.score_points`, of it.
     """
     if flight.manifest.kind == "twin":
-        return EXACT
-    truth = flight.table("truth")
-    moving = truth["time_s"].notna().groupby(truth["target_id"]).any()
-    used = scored["truth_id"].astype(str)
-    tracked = used.isin(moving[moving].index).to_numpy(bool)
-
-    def reported(which: set[str]) -> float:
-        if "sd_horizontal_m" not in truth:
-            return np.nan
-        sd = truth.loc[truth["target_id"].isin(which), "sd_horizontal_m"].to_numpy(float)
-        return float(np.nanmedian(sd)) if np.isfinite(sd).any() else np.nan
-
-    sds = reported(set(used[~tracked])), reported(set(used[tracked]))
-    return TruthKinds(int((~tracked).sum()), int(tracked.sum()), *sds)
+        return {}
+    truth, used = flight.table("truth"), set(scored["truth_id"].astype(str))
+    moving = set(truth.loc[truth["time_s"].notna(), "target_id"])
+    sd = truth.get("sd_horizontal_m", pd.Series(np.nan, truth.index)).astype(float)
+    kinds = {"track": used & moving, "mark": used - moving}
+    of = {kind: sd[truth["target_id"].isin(which)].dropna() for kind, which in kinds.items() if which}
+    return {kind: float(known.median()) if len(known) else np.nan for kind, known in of.items()}
 
 
 def gained_share(gain: Any) -> float:
@@ -353,7 +334,7 @@ def one_heading_hides(found: Accuracy) -> bool:
 
 
 def limits(
-    flight: Flight, found: Accuracy, truth: TruthKinds, programs: Sequence[str], source: str | None
+    flight: Flight, found: Accuracy, truth: Mapping[str, float], programs: Sequence[str], source: str | None
 ) -> list[Message]:
     """What the page does not tell: what always holds last, of the others those that apply; five at most."""
     manifest, diagnosis = flight.manifest, found.diagnosis
@@ -368,12 +349,12 @@ def limits(
         ("limit-clock-fitted", manifest.kind != "twin" and abs(rest) > 1e-6, {"offset": f"{rest:+.2f}"}),
         ("limit-halves", bool(found.halves.disagree), {}),
         ("limit-nearest", found.visible_m == found.visible_m, {"hidden": short_length(found.visible_m)}),
-        ("limit-track", truth.tracked > 0, {"sd": measure(truth.track_sd_m, "m")}),
+        ("limit-track", "track" in truth, {"sd": measure(truth.get("track", np.nan), "m")}),
         ("limit-wander", diagnosis is not None and diagnosis.counts, {}),
         ("limit-unlabelled", bool(programs), {}),
         ("limit-untimed", not timed, {}),
         ("limit-vertical", bool(manifest.vertical.correction_m), {}),
-        ("limit-mark", truth.marked > 0, {"sd": measure(truth.mark_sd_m, "m")}),
+        ("limit-mark", "mark" in truth, {"sd": measure(truth.get("mark", np.nan), "m")}),
         ("limit-marking", True, {}),
         ("limit-ground", True, {}),
     )
@@ -492,7 +473,7 @@ def show_accuracy(
         report.section(
             "Predicted uncertainty", " ".join(wording.messages([_ellipse_message(found.ellipses)]))
         )
-    truth = truth_kinds(flight, found.scored)
+    truth = truth_errors(flight, found.scored)
     report.limits(wording.messages(limits(flight, found, truth, unlabelled, source)))
     report.section("Details")
     if groups and logged.n:
@@ -670,7 +651,6 @@ def show_repeats(report: Report, flight: Flight, found: Repeats, amiss: Sequence
         gain = diagnosis.winner.gain.gain
         n = len(diagnosis.scored)
         report.metric("sighting_gain", "winner", gain.estimate, "m", n=n, low=gain.low, high=gain.high)
-        report.metric("cause_certain", "winner", float(diagnosis.counts), "1", n=n)
         if diagnosis.winner.causes:
             cause.table("parameters", parameters_table(report, diagnosis.calibration))
     report.limits([wording.say(one) for one in texts.limits])

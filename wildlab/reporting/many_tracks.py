@@ -37,10 +37,9 @@ SMALLEST, LARGEST = 0.5, 2.0
 # -- numbers
 
 
-def counts_of(shown: ManyTracks) -> tuple[int, float]:
-    """How many tracks there are in all, and at a scan in the mean."""
-    names = {int(one) for scan in shown.shown for one in scan.identity}
-    return len(names), float(np.mean([len(scan.identity) for scan in shown.shown])) if shown.shown else 0.0
+def count_tracks(shown: ManyTracks) -> int:
+    """How many tracks there are in all."""
+    return len({int(one) for scan in shown.shown for one in scan.identity})
 
 
 def most_at_once(followed: ManyTracks) -> Count:
@@ -108,7 +107,7 @@ VERDICTS = {
 
 def answer(followed: ManyTracks, lives: Identities | None) -> list[Message]:
     """How well the targets are tracked, and what goes wrong: two sentences at most."""
-    tracks, _ = counts_of(followed)
+    tracks = count_tracks(followed)
     values = {"tracks": tracks, "scans": len(followed.scans), "minutes": f"{followed.minutes:.1f}"}
     if not tracks:
         return [Message("no-track", values)]
@@ -147,7 +146,7 @@ def verdict_of(message: Message) -> tuple[str, str]:
 
 def reason(followed: ManyTracks, lives: Identities | None) -> Message:
     """The most pressing of what keeps the tracks from being sound."""
-    if not counts_of(followed)[0]:
+    if not count_tracks(followed):
         return Message("reason-none")
     seen = [] if lives is None else [life for life in lives.targets.values() if life.visible]
     if lives is None or not seen:
@@ -275,9 +274,7 @@ def parts_table(found: Sequence[Gospa]) -> pd.DataFrame:
 
 def record(report: Report, followed: ManyTracks, lives: Identities | None) -> None:
     """The numbers, for ``metrics.json``."""
-    tracks, at_once = counts_of(followed)
-    report.metric("tracks", "all", tracks, "1", n=len(followed.scans))
-    report.metric("tracks_at_a_look", "all", at_once, "1", n=len(followed.scans))
+    report.metric("tracks", "all", count_tracks(followed), "1", n=len(followed.scans))
     most = most_at_once(followed)
     report.metric("targets_at_once", "most", most.mean, "1", low=most.low, high=most.high)
     if lives is None:

@@ -13,12 +13,6 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from wildlab.analysis.overview import (
-    APART_M,
-    APART_SD,
-    APART_SHARE,
-    JUMP,
-    JUMP_M,
-    LEANT_DEG,
     Alarm,
     Gain,
     Issue,
@@ -27,7 +21,6 @@ from wildlab.analysis.overview import (
     troubled_for,
 )
 from wildlab.analysis.verdict import (
-    LISTED,
     MOST,
     WORTH,
     Numbers,
@@ -38,8 +31,6 @@ from wildlab.analysis.verdict import (
     possible_gain,
     verdict_of,
 )
-from wildlab.evaluation.streams import FINE, FLOOR_HZ, HARMFUL
-from wildlab.flight.clocks import MAX_GAP_S, USUAL_STEPS
 from wildlab.messages import quantities
 from wildlab.messages.catalogue import Message, load_texts
 from wildlab.messages.quantities import FORMS, metres, number, percent_of
@@ -51,24 +42,6 @@ from wildlab.reporting.report import Report, Wording
 #: Subject of what is recorded of the whole flight.
 FLIGHT = "flight"
 _UNITS = {"jumps": "m", "leans": "deg", "apart": "m", "shakes": "m/s^2"}
-
-
-#: Constants that the method names.
-METHOD_VALUES = {
-    "gap": f"{MAX_GAP_S:g}",
-    "steps": f"{USUAL_STEPS:g}",
-    "jump": f"{JUMP:g}",
-    "jump_m": f"{JUMP_M:g}",
-    "leant": f"{LEANT_DEG:g}",
-    "apart_m": f"{APART_M:g}",
-    "apart_sd": f"{APART_SD:g}",
-    "apart_share": f"{100 * APART_SHARE:g}",
-    "fine": f"{FINE:g}",
-    "harmful": f"{HARMFUL:g}",
-    "floor": f"{FLOOR_HZ:g}",
-    "listed": f"{100 * LISTED:g}",
-    "worth": f"{100 * WORTH:g}",
-}
 
 
 class Judged(NamedTuple):
@@ -269,7 +242,6 @@ def record(report: Report, overview: Overview, gains: Sequence[Gain], counts: Ma
         note("images_with_pose", 1 - _without_pose(overview) / frames, "1", frames)
     if overview.coverage is not None and overview.coverage.placed.any():
         note("area_seen", overview.coverage.area_m2, "m^2", int(overview.coverage.placed.sum()))
-        note("images_per_place", overview.coverage.looks, "1")
     seen, images, placed = overview.detections
     in_images = overview.detections_in_images
     for name, count, n, told in (
@@ -283,7 +255,6 @@ def record(report: Report, overview: Overview, gains: Sequence[Gain], counts: Ma
             note(name, count, "1", n)
     if overview.vibration is not None:
         worst = overview.vibration[0].max(axis=1)
-        note("shaking_median", float(np.median(worst)), "m/s^2", len(worst))
         note("shaking_max", float(worst.max()), "m/s^2", len(worst))
     for trouble in overview.troubles:
         report.metric("trouble", trouble.what.replace(" ", "-"), trouble.seconds, "s", n=len(trouble.spells))
@@ -471,7 +442,7 @@ def show_overview(
     }
     for key, frame in frames.items():
         wording.table(key, frame)
-    report.method(wording.say(wording.texts.method, METHOD_VALUES))
+    report.method(wording.texts.method)
 
 
 def _show_figures(wording: Wording, overview: Overview) -> None:

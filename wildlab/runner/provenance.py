@@ -26,7 +26,7 @@ from wildlab.flight.manifest import FILE_NAME, read_manifest
 from wildlab.flight.store import manifest_changed, verify
 from wildlab.paths import LOCK, ROOT
 from wildlab.reporting.notebook_pages import ALERT
-from wildlab.reporting.text import escape
+from wildlab.reporting.text import escape, render
 from wildlab.runner.seeds import PACKAGES, SeedWork, package_version, read_seed, seed_digest
 from wildlab.runner.status import AGAIN, BEFORE_DIGESTS, FILES, STATUS, has_digests, misfits
 
@@ -210,37 +210,11 @@ def footer(
     provenance: dict[str, Any], *, beside: tuple[str, ...] = ("provenance.json", "notebook.ipynb")
 ) -> str:
     """The provenance in one plain line of HTML for the foot of a page."""
-    wildlab = provenance["wildlab"]
-    if wildlab["commit"]:
-        changed = ", <b>with changes not committed</b>" if wildlab["dirty"] else ""
-        commit = f"<code>{escape(wildlab['commit'][:10])}</code>{changed}"
-        code = f"wildlab {escape(wildlab['version'])} at commit {commit}"
-    else:
-        code = f"wildlab {escape(wildlab['version'])} ({escape(wildlab['note'])})"
-    parts = [code]
-    for one in [provenance["flight"], *provenance.get("others", ())] if provenance["flight"] else ():
-        files = one["files"]
-        hashes = ", ".join(f"{escape(name)} <code>{digest[:8]}</code>" for name, digest in files.items())
-        parts.append(f"flight {escape(one['name'])}: {hashes}" if files else "flight without files")
-        if one.get("manifest_changed"):
-            parts.append("<b>flight.toml changed since it was written</b>")
-    lock = provenance["lock"]["sha256"]
-    parts.append(f"lock <code>{lock[:8]}</code>" if lock else "no lock file")
-    parts.append(f"notebook <code>{provenance['notebook']['sha256'][:8]}</code>")
-    if provenance["seed"] is not None:
-        parts.append(f"seed {escape(provenance['seed'])}")
-    if seeds := provenance.get("seeds"):
-        parts.append(
-            f"numbers of {len(seeds['digests'])} kept seed{'s' * (len(seeds['digests']) != 1)} "
-            f"<code>{seeds['digest'][:8]}</code>"
-        )
-    parts.append(f"made {escape(provenance['made'].replace('T', ' ').replace('+00:00', ' UTC'))}")
-    line = f"<p>{' · '.join(parts)}.</p>"
-    # Words, not links: the page is passed on alone.
-    links = " and ".join(f"<code>{escape(name)}</code>" for name in beside)
-    if not links:
-        return line
-    return f"{line}<p>Code, parameters and all hashes (SHA-256) are in {links} beside this page.</p>"
+    flights = [provenance["flight"], *provenance.get("others", ())] if provenance["flight"] else []
+    made = provenance["made"].replace("T", " ").replace("+00:00", " UTC")
+    about = {**provenance, "seeds": provenance.get("seeds"), "made": made, "flights": flights}
+    # Names, not links: the page is passed on alone.
+    return str(render("provenance", **about, beside=beside))
 
 
 class Verification(NamedTuple):
