@@ -3,10 +3,15 @@
 import re
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
+import wildlab
 from tests.analysis.survey_twin import Survey, simulate
 from tests.commands import refuse, succeed
+from wildlab.analysis.accuracy import corrected_flight
+from wildlab.analysis.georeference import truth_of
+from wildlab.analysis.tracks.tracker import read_inputs
 from wildlab.errors import WildlabError
 from wildlab.evaluation.intervals import Interval
 from wildlab.flight.calibration_files import parse_learnt, read_learnt, write_calibration
@@ -127,3 +132,26 @@ def test_a_flight_imported_with_a_calibration_keeps_it_and_is_judged_with_it(fol
     (tmp_path / "g" / "calibration.toml").write_text(text)
     with pytest.raises(WildlabError, match="SHA-256"):
         load_flight(tmp_path / "g")
+
+
+@pytest.mark.slow
+def test_a_kept_calibration_moves_points_and_tracks_as_the_corrections_by_hand_do(folder, tmp_path):
+    """A tilt of 5 degrees that the flight keeps, against the same tilt written into the manifest."""
+    succeed("calibrate", folder / "tilted", "--out", tmp_path / "c.toml")
+    learnt = read_learnt(tmp_path / "c.toml")
+    flight = load_flight(folder / "tilted")
+    save_flight(flight, tmp_path / "kept", calibration=learnt)
+    kept = load_flight(tmp_path / "kept")
+    by_hand = corrected_flight(flight, None, learnt)
+    truth = truth_of(flight, wildlab.georeference(flight).table)[:, :2]
+    off = {}
+    for name, one in (("logged", flight), ("kept", kept), ("by hand", by_hand)):
+        points = wildlab.georeference(one).table[["north_m", "east_m"]].to_numpy()
+        off[name] = np.hypot(*(points - truth).T).mean()
+    assert off["kept"] < 0.5 * off["logged"]
+    assert off["kept"] == pytest.approx(off["by hand"], rel=1e-6)
+    one, other, logged = (read_inputs(flight, source=None).sensors for flight in (kept, by_hand, flight))
+    for name, inputs in one.items():
+        R = inputs.scans.poses.R_nc
+        assert np.allclose(R, other[name].scans.poses.R_nc, atol=1e-12)
+        assert not np.allclose(R, logged[name].scans.poses.R_nc, atol=0.01)

@@ -53,6 +53,7 @@ from wildlab.flight.calibration_files import (
     LearntNoise,
     LearntOn,
     LearntParameter,
+    read_learnt,
     refuse_other_camera,
 )
 from wildlab.flight.clocks import poses_at, truth_at
@@ -68,6 +69,7 @@ from wildlab.geometry.frames import (
     quaternion_to_matrix,
     wrap,
 )
+from wildlab.geometry.uncertainty import PoseErrors
 
 
 @dataclass(frozen=True)
@@ -484,7 +486,7 @@ def apply_learnt(observations: Observations, learnt: Learnt) -> Applied:
 
 
 def corrected_flight(flight: Flight, source: str | None, learnt: Learnt) -> Flight:
-    """A flight whose manifest and poses say what the calibration says, for checks of whether it makes sense.
+    """A flight whose manifest and poses say what the calibration says.
 
     Parameters
     ----------
@@ -498,7 +500,7 @@ def corrected_flight(flight: Flight, source: str | None, learnt: Learnt) -> Flig
     Returns
     -------
     Flight
-        With other clock, mount, camera, positions and heading of that source.
+        With other clock, mount, camera, noise, positions and heading of that source.
     """
     calibration, m = _calibration(learnt), flight.manifest
     name, nav = flight.pose_source(source)
@@ -510,6 +512,7 @@ def corrected_flight(flight: Flight, source: str | None, learnt: Learnt) -> Flig
         m,
         {
             "clocks": {"camera_offset_s": m.clocks.camera_offset_s + calibration.value("clock")},
+            "uncertainty": learnt.noise.model_dump(),
             "camera": {
                 "fx_px": camera.fx,
                 "fy_px": camera.fy,
@@ -528,6 +531,25 @@ def corrected_flight(flight: Flight, source: str | None, learnt: Learnt) -> Flig
     turned = euler_to_matrix(0.0, 0.0, calibration.value("heading")) @ quaternion_to_matrix(nav[[*_TURN]])
     moved[[*_TURN]] = matrix_to_quaternion(turned)
     return replace(flight, manifest=changed, nav={**flight.nav, name: moved})
+
+
+def as_calibrated(flight: Flight, source: str | None = None) -> Flight:
+    """`corrected_flight` by the calibration that the flight keeps; itself where it keeps none."""
+    if flight.calibration is None:
+        return flight
+    learnt = read_learnt(flight.calibration)
+    refuse_other_camera(flight.manifest, learnt)
+    return corrected_flight(flight, source, learnt)
+
+
+def observe_calibrated(flight: Flight, source: str | None = None) -> tuple[Observations, PoseErrors | None]:
+    """`observe`, with the calibration applied that the flight keeps, and the errors of its noise; None for
+    those that log and manifest state."""
+    observations = observe(flight, source)
+    if flight.calibration is None:
+        return observations, None
+    applied = apply_learnt(observations, read_learnt(flight.calibration))
+    return applied.observations, pose_errors(applied.observations, applied.deviations)
 
 
 def _calibration(learnt: Learnt) -> Calibration:

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from wildlab.analysis.georeference import covariances_of, errors_of, observe, score_points
+from wildlab.analysis.accuracy import observe_calibrated
+from wildlab.analysis.georeference import covariances_of, errors_of, score_points
 from wildlab.analysis.georeference import georeference as to_ground
 from wildlab.evaluation.errors import ErrorSummary, summarise
 from wildlab.flight.checks.check import Finding, Use, check_flight, usable_for
@@ -137,6 +138,8 @@ class Points(Brief):
 def georeference(flight: Flight, source: str | None = None, seed: int = 0) -> Points:
     """Put a flight's pixel detections on the ground, each with its covariance.
 
+    A calibration that the flight keeps is applied.
+
     Poses and ground come from the flight, the ground being its terrain where it has one; standard deviations
     from the log where it has them, else from the manifest, else usual ones
     (`wildlab.analysis.georeference.USUAL`).
@@ -169,7 +172,8 @@ def georeference(flight: Flight, source: str | None = None, seed: int = 0) -> Po
     [False, False]
     """
     name, _ = flight.pose_source(source)
-    return Points(flight, name, to_ground(observe(flight, name), np.random.default_rng(seed)))
+    observations, errors = observe_calibrated(flight, name)
+    return Points(flight, name, to_ground(observations, np.random.default_rng(seed), errors))
 
 
 @dataclass(frozen=True, repr=False)

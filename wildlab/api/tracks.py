@@ -10,11 +10,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from wildlab.analysis.accuracy import observe_calibrated
 from wildlab.analysis.georeference import (
     assumed_deviations,
     assumed_pose_covariance,
     georeference,
-    observe,
 )
 from wildlab.analysis.navigate import (
     REFERENCES,
@@ -355,7 +355,7 @@ def _places(flight: Flight, found: TrackingResult, one: SensorTrack, source: str
         return np.where((one.detection != "")[:, None], chosen, np.nan)
     # With a clock that is corrected the poses of other times count.
     if scans.kind == "pixel" and not found.beliefs[one.sensor].offset_s:
-        points = georeference(observe(flight, source), np.random.default_rng(0))
+        points = georeference(observe_calibrated(flight, source)[0], np.random.default_rng(0))
         places = points.set_index("detection_id")[["north_m", "east_m"]]
         return places.reindex(one.detection).to_numpy(float)
     return nothing

@@ -105,7 +105,9 @@ def georeference(flight: Path, out: Path, overwrite: bool, source: str | None, s
     """
     import numpy as np
 
-    from wildlab.analysis.georeference import SUFFIXES, ground_facts, observe, write_points
+    from wildlab.analysis import fact
+    from wildlab.analysis.accuracy import observe_calibrated
+    from wildlab.analysis.georeference import SUFFIXES, ground_facts, write_points
     from wildlab.analysis.georeference import georeference as to_ground
     from wildlab.flight.store import load_flight
     from wildlab.messages.catalogue import words
@@ -115,12 +117,13 @@ def georeference(flight: Path, out: Path, overwrite: bool, source: str | None, s
         raise WildlabError(f"nobody can write {out.suffix!r}", f"use {' or '.join(SUFFIXES)}", file=out)
     refuse_existing(out, overwrite)
     data = load_flight(flight)
-    observations = observe(data, source)
+    observations, errors = observe_calibrated(data, source)
     tell_source(data, source, terminal_console())
-    points = to_ground(observations, np.random.default_rng(seed))
+    points = to_ground(observations, np.random.default_rng(seed), errors)
     write_points(data, points, out, observations.source)
     tell_contradictions(data)
-    for line in words("terminal", ground_facts(observations, points)):
+    kept = [] if data.calibration is None else [fact("calibration-kept")]
+    for line in words("terminal", [*kept, *ground_facts(observations, points)]):
         click.echo(line)
     click.echo(shown(out))
 

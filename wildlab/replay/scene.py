@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from wildlab.analysis.georeference import covariances_of, georeference, observe, score_points
+from wildlab.analysis.accuracy import observe_calibrated
+from wildlab.analysis.georeference import covariances_of, georeference, score_points
 from wildlab.analysis.overview import POSITION, cover_images, ground_height, ordered
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import position_nees
@@ -401,8 +402,8 @@ def _points(flight: Flight, source: str | None, lacks: list[str]) -> Points | No
     if flight.detections is None or not (flight.detections["kind"] == "pixel").any():
         return None
     try:
-        seen = observe(flight, source)
-        table = georeference(seen, np.random.default_rng(0))
+        seen, errors = observe_calibrated(flight, source)
+        table = georeference(seen, np.random.default_rng(0), errors)
     except WildlabError as refusal:
         lacks.append(f"detections on the ground: {refusal.problem}")
         return None

@@ -15,7 +15,7 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
-from wildlab.analysis.georeference import observe
+from wildlab.analysis.accuracy import observe_calibrated
 from wildlab.analysis.overview import ALARMS, TROUBLES, Alarm, Gain, look_over
 from wildlab.analysis.verdict import (
     MOST,
@@ -614,7 +614,7 @@ def _seen(flight: Flight, source: str | None) -> Array:
     if source is None or flight.detections is None or flight.manifest.camera is None:
         return np.empty((0, 2))
     try:
-        seen = observe(flight, source)
+        seen, _ = observe_calibrated(flight, source)
     except WildlabError:
         return np.empty((0, 2))
     return georeference_pixels(seen.poses, seen.uv, seen.plane_down)[:, :2]

@@ -18,6 +18,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from wildlab.analysis.accuracy import as_calibrated
 from wildlab.analysis.tracks.noise_model import (
     OF_UNNAMED,
     STATED,
@@ -112,13 +113,15 @@ def read_inputs(
         Where there is no such sensor, no detection, no time, or noise nobody knows.
     """
     refuse_without_times(flight)
+    notes = [] if flight.calibration is None else ["The calibration that the flight keeps is applied."]
+    flight = as_calibrated(flight, source)
     stated = settings_of(flight, settings)
     targets, given = model_targets(stated.targets)
     if tuned is not None and tuned.density is not None and stated.targets.acceleration_m_s_sqrt_s is None:
         targets = targets._replace(density=tuned.density)
         given = [one for one in given if not one.what.startswith("acceleration")]
         given.insert(0, tuned.given_density())
-    notes = [*_notes_of_absent(flight, stated), *_notes_of_sources(flight)]
+    notes += [*_notes_of_absent(flight, stated), *_notes_of_sources(flight)]
     found: dict[str, SensorInputs] = {}
     for name in sensors_with_detections(flight, sensors):
         scans = scans_of(flight, name, 0.0, source)
