@@ -39,6 +39,7 @@ from wildlab.flight.files import dump_toml, is_safe_name, printable, read_toml
 from wildlab.flight.heights import NO_GRID, HeightPlan, HeightUse, choose_reference
 from wildlab.flight.importing import import_flight
 from wildlab.flight.manifest import CameraPart, TerrainSays
+from wildlab.flight.readers.clicks import note_of_kinds
 from wildlab.flight.readers.log import PARTS, Stream
 from wildlab.flight.schema import QUATERNION
 from wildlab.flight.store import Flight
@@ -424,8 +425,9 @@ class Proposal:
                 "frame": "stem" if frames["id"] == "stem" else "image",
                 "pixel": quantities("uv", "{}_px", "px"),
             }
-            if "name" in stream.columns:
-                block["target"] = "name"
+            kinds = "" if self.by_role["marks"] else note_of_kinds(stream, one.item.shown)
+            self.notes += [kinds] if kinds else []
+            block |= {"target": "name"} if "name" in stream.columns and not kinds else {}
             if level is not None:
                 block["ground"] = {"height": {"value": level, "unit": "m"}}
             self.logs[block["file"]]["images"] = frames["file"]

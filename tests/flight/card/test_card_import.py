@@ -76,6 +76,18 @@ def test_a_track_beside_the_images_is_a_target_once(card, tmp_path):
     assert np.allclose(np.diff(tracks["north_m"]), 0.5, atol=1e-3)
 
 
+@pytest.mark.parametrize(("second", "target"), [("deer", None), ("fox", "name")])
+def test_names_of_kinds_are_no_targets(card, second, target):
+    """Two boxes of one category in an image are two animals, and not one that is there twice."""
+    (card / "marks.csv").unlink()
+    rows = (card / "clicks.csv").read_text(encoding="utf-8").splitlines()
+    image = rows[1].split(",")[0]
+    boxes = [f"{image},100,100,deer", f"{image},300,200,{second}"]
+    (card / "clicks.csv").write_text("\n".join(["image,u,v,name", *boxes]) + "\n", encoding="utf-8")
+    said = tomllib.loads(call(card, "--dry-run", "--zone", "UTC").stdout)
+    assert said["detections"][0].get("target") == target
+
+
 def test_a_dry_run_writes_nothing_gives_a_recipe_and_tells_no_place(card, tmp_path):
     before = sorted(tmp_path.rglob("*"))
     result = call(card, "--dry-run", "--zone", "UTC")

@@ -78,6 +78,17 @@ def folder_decode(folder: Path, zone: str | None) -> RawLog:
     return _decoded(read_yolo_folder(folder), folder, folder)
 
 
+def note_of_kinds(clicks: Stream, shown: str) -> str:
+    """A sentence where names are of kinds, not of single things: one stands twice in an image; else "".
+
+    A surveyed point that was clicked twice is one point all the same: ask where none is surveyed.
+    """
+    pairs = zip(clicks.columns["image"], clicks.columns.get("name", ()), strict=False)
+    kind = next((name for (_, name), count in Counter(pairs).items() if name and count > 1), "")
+    said = f"{shown}: {kind!r} stands twice in one image, so names are of kinds and name no target"
+    return f"{said}: track them by wildlab track --many." if kind else ""
+
+
 def _decoded(marked: Marked, path: Path, folder: Path) -> RawLog:
     crowd = marked.table["crowd"].astype(bool)
     table = marked.table[~crowd]
