@@ -157,9 +157,9 @@ def track(
 
     Detections are pixels, bearings, ranges, positions or velocities. Filters: ekf (white noise), ukf, imm
     (two motions), coloured (correlated noise), schmidt (platform, clock or range have a bias), thinned. Left
-    out: ekf, and schmidt beside it where there are errors to consider. The report says whether they are
-    consistent; estimates.parquet and .csv beside it have states, covariances and innovations. --tune learns
-    from the truth, where there is any, or from innovations.
+    out: ekf, and schmidt and coloured beside it where there are errors to consider. The report says
+    whether they are consistent; estimates.parquet and .csv beside it have states, covariances and
+    innovations. --tune learns from the truth, where there is any, or from innovations.
 
     With --many nobody says whose a detection is: tracks begin and end by themselves, and where true places
     are known the report says which targets were lost or mixed up. Bearings move tracks that another sensor

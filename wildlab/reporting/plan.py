@@ -10,6 +10,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.patches import Patch
+from scipy.ndimage import distance_transform_edt
 
 from wildlab.analysis.plan import Plan
 from wildlab.analysis.plan_coverage import Covered
@@ -128,9 +129,13 @@ def _tiles(plan: Plan, result: Mapping[str, Any], wording: Wording) -> list[tupl
 def _show_map(wording: Wording, plan: Plan, covered: Sequence[Covered], result: Mapping[str, Any]) -> None:
     fig, ax = new_figure(5.8, 5.2)
     shown = {kind for one in covered for kind in _draw_covered(ax, one)}
-    for area, name in zip(plan.areas.areas, plan.names, strict=True):
+    for area, name, cells in zip(plan.areas.areas, plan.names, covered, strict=True):
         draw_fences(ax, [area.outline, *area.holes])
-        mark_place(ax, area.outline.mean(axis=0), name, below=True)
+        # Furthest from all fences: the middle may lie in a hole.
+        room = distance_transform_edt(np.pad(cells.inside, 1))[1:-1, 1:-1]
+        row, column = np.unravel_index(np.argmax(room), room.shape)
+        place = np.array([cells.north + row * cells.step, cells.east + column * cells.step])
+        mark_place(ax, place, name, below=True)
     many = len(plan.sorties) > NAMED
     for k, one in enumerate(plan.sorties):
         colour = FLIGHTS[k % len(FLIGHTS)]
