@@ -124,6 +124,15 @@ def test_every_track_is_in_the_denominator():
     assert page.reason(both).values["counts"] == "1 consistent, 2 overconfident, 1 not judged"
 
 
+def test_every_filter_that_the_numbers_are_of_is_named():
+    """A radar's track by the Schmidt filter, and three of a sensor that has the EKF alone."""
+    others = [rows(target=f"t{k}", rmse=40.0, nees=80.0, verdict="overconfident") for k in range(3)]
+    others = [one.iloc[1:].assign(filter="ekf", sensor="lidar") for one in others]
+    mine = rows(rmse=1.0, nees=80.0, verdict="overconfident")
+    first = page.answer(pd.concat([mine, *others]), [])[0]
+    assert (first.values["filter"], first.values["rmse"]) == ("EKF and Schmidt filter", "40 m")
+
+
 def test_few_values_make_a_no_a_perhaps_not():
     near = rows(nees=5.3, verdict="overconfident", rmse=1.0)
     assert keys(near)[0] == "errors-doubtful"

@@ -69,15 +69,20 @@ def test_a_folder_to_work_in_is_private_and_gone_afterwards(tmp_path, monkeypatc
 def test_what_a_machine_left_when_it_stopped_goes_with_the_next_run(tmp_path, monkeypatch):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     (tmp_path / "wildlab-share-before" / "reports").mkdir(parents=True)
+    (tmp_path / "wildlab-share-before" / ".wildlab-private").touch()
+    (tmp_path / "wildlab-share-results").mkdir()  # somebody's own
     (tmp_path / "wildlab-share-link").symlink_to(tmp_path)
     with private_folder() as work, private_folder() as other:
         assert work.is_dir() and other.is_dir() and not (tmp_path / "wildlab-share-before").exists()
-    assert [one.name for one in tmp_path.iterdir()] == ["wildlab-share-link"]
+    assert {one.name for one in tmp_path.iterdir()} == {"wildlab-share-link", "wildlab-share-results"}
     out = tmp_path / "out"
     out.mkdir()
-    (out / ".copy.html.x7").write_text("half of what is for the sender alone")
+    (out / ".copy.html.x7_kq2ab").write_text("half of what is for the sender alone")
+    (out / ".copy.html.swp").write_text("an editor's")
+    (out / ".copy.html.whatever").mkdir()
     put(b"whole", out / "copy.html", overwrite=False, mode=0o600)
-    assert [one.name for one in out.iterdir()] == ["copy.html"]
+    left = {one.name for one in out.iterdir()}
+    assert left == {"copy.html", ".copy.html.swp", ".copy.html.whatever"}
     assert (out / "copy.html").stat().st_mode & 0o077 == 0
 
 

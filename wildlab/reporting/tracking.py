@@ -211,7 +211,10 @@ def answer(rows: pd.DataFrame, pairs: Sequence[SensorPair]) -> list[Message]:
     ratio = np.sqrt(known[what] / (2.0 if with_truth else known["dof"]))
     values = {
         "n": len(mine),
-        "filter": load_texts("tracking").subjects[str(mine["filter"].iloc[0])],
+        # Where sensors' detections go through different filters, all of them, the most frequent first.
+        "filter": " and ".join(
+            load_texts("tracking").subjects[str(name)] for name in shown["filter"].value_counts().index
+        ),
         "judged": len(judged),
         "rmse": length(float(shown["rmse"].median())) if with_truth else "",
         "times": significant(float(np.median(ratio)) if len(ratio) else np.nan),

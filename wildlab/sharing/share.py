@@ -7,6 +7,7 @@ import fcntl
 import glob
 import io
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -378,8 +379,10 @@ _TIME = (1980, 1, 1, 0, 0, 0)
 SHORTEST = 12
 
 
-#: How the name of a `private_folder` begins.
-_PREFIX = "wildlab-share-"
+#: How the name of a `private_folder` begins, and the file in it that says it is one.
+_PREFIX, _MARK = "wildlab-share-", ".wildlab-private"
+#: How the name of a file ends that is written and not finished, see `wildlab.files.write_atomic`.
+_PART = re.compile(r"\.[a-z0-9_]{8}")
 #: Waits until the process that started it is gone, however it ended, and removes a folder until it stays
 #: away: what that process had started may still write into it.
 _WATCH = """
@@ -398,12 +401,13 @@ def private_folder() -> Iterator[Path]:
     """A folder among the system's temporary ones that nobody else may open; gone afterwards, however it ends.
 
     A process of its own watches over it, so that nothing is left where this one is killed. Those that a
-    machine has left when it stopped go first: nobody holds their lock any more.
+    machine has left when it stopped go first: they carry our mark, and nobody holds their lock any more.
     """
-    for left in Path(tempfile.gettempdir()).glob(f"{_PREFIX}*"):
-        with contextlib.suppress(OSError), _held(left):
-            shutil.rmtree(left, ignore_errors=True)
+    for left in Path(tempfile.gettempdir()).glob(f"{_PREFIX}*/{_MARK}"):
+        with contextlib.suppress(OSError), _held(left.parent):
+            shutil.rmtree(left.parent, ignore_errors=True)
     with tempfile.TemporaryDirectory(prefix=_PREFIX) as folder, _held(Path(folder)):
+        (Path(folder) / _MARK).touch()  # not before the lock is held
         command = [sys.executable, "-I", "-S", "-c", _WATCH, folder]
         watch = subprocess.Popen(  # noqa: S603 - our own words
             command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
@@ -494,6 +498,7 @@ def put(content: bytes, target: Path, overwrite: bool, mode: int = 0o644) -> Non
     """
     refuse_existing(target, overwrite)
     target.parent.mkdir(parents=True, exist_ok=True)
-    for part in target.parent.glob(f".{glob.escape(target.name)}.*"):
-        part.unlink(missing_ok=True)
+    for part in target.parent.glob(f".{glob.escape(target.name)}.????????"):
+        if _PART.fullmatch(part.suffix) and part.is_file() and not part.is_symlink():
+            part.unlink(missing_ok=True)
     write_atomic(target, content, mode)

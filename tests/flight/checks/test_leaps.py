@@ -1,6 +1,7 @@
 """A leap of a position is told from a clock that is off, on flights with one, the other, or both."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -76,3 +77,18 @@ def test_a_stray_place_and_a_gap_are_no_leaps():
     stray.loc[500:502, "north_m"] += 80.0
     assert find_leaps(stray) == []
     assert find_leaps(table[(table["time_s"] < 40) | (table["time_s"] > 60)]) == []
+
+
+@pytest.mark.parametrize(("speed", "radius"), [(15.0, 30.0), (22.0, 60.0), (22.0, 50.0)])
+def test_turns_of_a_log_of_a_second_without_velocities_are_no_leaps(speed, radius):
+    """One oval of two legs of 500 m, banked by up to 45 degrees."""
+    leg, turn = 500.0, np.pi * radius
+    times = np.arange(0.0, 2 * (leg + turn) / speed)
+    along = speed * times
+    back, rest = along >= leg + turn, along % (leg + turn)
+    angle = np.clip(rest - leg, 0, None) / radius
+    places = np.stack([np.minimum(rest, leg) + radius * np.sin(angle), radius * (1 - np.cos(angle))], axis=1)
+    places = np.where(back[:, None], [[leg, 2 * radius]] - places, places)
+    places = places + np.random.default_rng(1).normal(0, 0.1, places.shape)
+    table = pd.DataFrame(places, columns=["north_m", "east_m"]).assign(down_m=-80.0, time_s=times)
+    assert not [one for one in find_leaps(table) if np.hypot(*one.by[:2]) > 25]

@@ -306,8 +306,8 @@ WITHIN_S, LEAST_M, FAR = 2.0, 5.0, 12.0
 BESIDE_S = 5.0
 #: Rows closer than that (s) tell no more.
 FINEST_S = 0.1
-#: A velocity is the median of so many steps, over so long at least (s), where the table has none.
-STEPS, STEPS_S = 9, 3.0
+#: A velocity is the median of the steps of so long (s), of three at least, where the table has none.
+STEPS_S = 3.0
 #: Rows below which nothing is told from noise; leaps beyond which a table is rough, and not leaping.
 FEWEST, MOST_LEAPS = 30, 5
 
@@ -357,7 +357,8 @@ def find_leaps(table: pd.DataFrame, name: str = "") -> list[Leap]:
     if has_velocity and np.isfinite(values[:, 4:]).all():
         expected = (values[1:, 4:] + values[:-1, 4:]) / 2 * step
     else:
-        steps = max(STEPS, 1 + 2 * int(STEPS_S / usual / 2))
+        # Longer ones clip turns: a leap of one row stands out of three.
+        steps = 1 + 2 * max(1, int(STEPS_S / usual / 2))
         expected = median_filter(gone / step, (steps, 1), mode="nearest") * step
     # Behind a gap nobody knows how far it should have gone.
     unexplained = np.where(step > max(WITHIN_S, 3 * usual), 0.0, gone - expected)
