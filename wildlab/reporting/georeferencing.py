@@ -396,7 +396,7 @@ def show_advice(report: Report, said: Sequence[str]) -> None:
 
 
 def show_contradictions(report: Report, amiss: Sequence[str]) -> None:
-    """What does not fit together in the flight: these sentences name no place."""
+    """What does not fit together in the flight: these sentences hold no coordinates, but names of targets."""
     if amiss:
         report.alert("What does not fit together", amiss)
 

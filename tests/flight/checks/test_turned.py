@@ -9,15 +9,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.flight.checks.flights import boats
+from tests.flight.checks.flights import WITHOUT_CAMERA, boats
 from tests.flight.checks.watching import add_sensor, level_poses, watch
 from tests.flight.conftest import table
-from wildlab.flight.checks.check import check_flight
+from wildlab.flight.checks.check import check_flight, find
 from wildlab.flight.checks.findings import Finding
 from wildlab.flight.checks.sensors import SourceLooks, best_turn
-from wildlab.flight.manifest import replace_in_manifest
+from wildlab.flight.manifest import make_manifest, replace_in_manifest
 from wildlab.flight.store import Flight
-from wildlab.geometry.frames import wrap
+from wildlab.geometry.frames import euler_to_matrix, matrix_to_quaternion, wrap
 
 
 def said(flight: Flight) -> list[Finding]:
@@ -150,3 +150,19 @@ def test_what_a_sensor_places_goes_with_its_platform_where_its_clock_is_moved():
     assert later.places is not None
     assert np.allclose(later.places - later.own, places) and np.allclose(later.own[:, 0], 6.0)
     assert np.allclose(later.targets[..., 1], 3.0) and np.allclose(later.heading, 0.3)
+
+
+@pytest.mark.parametrize("speed", [5.0, 8.0, 12.0])
+@pytest.mark.parametrize("heel", [0.03, 0.05])
+def test_a_vessel_that_heels_outward_is_not_accused(speed, heel):
+    """By 0.03 to 0.05 rad for each m/s^2, where an aircraft banks inward by 0.1."""
+    t, rng = np.arange(0.0, 400.0, 0.2), np.random.default_rng(0)
+    rate = 0.08 * np.sin(2 * np.pi * t / 60) + 0.05 * np.sin(2 * np.pi * t / 23)
+    yaw = np.cumsum(rate) * 0.2
+    places = np.cumsum(speed * np.stack([np.cos(yaw), np.sin(yaw), 0 * t], axis=1), axis=0) * 0.2
+    roll = -heel * speed * rate + rng.normal(0, 0.005, len(t))
+    R = euler_to_matrix(roll, rng.normal(0, 0.01, len(t)), yaw)
+    nav = pd.DataFrame(places + rng.normal(0, 0.05, places.shape), columns=["north_m", "east_m", "down_m"])
+    nav[["q_w", "q_x", "q_y", "q_z"]] = matrix_to_quaternion(R)
+    flight = Flight(make_manifest(WITHOUT_CAMERA), {"autopilot": nav.assign(time_s=t)}, {})
+    assert not [one for one in find(flight, plain=False) if one.level != "note"]

@@ -435,6 +435,8 @@ COURSE_S, MOST_COURSES = 2.0, 2000
 APART, FOLLOWS = 0.5, 0.9
 #: Correlation between lean and acceleration that a right heading has at least, in the air.
 LEANS = 0.5
+#: How much an aircraft leans in a turn, as a share of what a coordinated turn asks for.
+COORDINATED = (0.5, 1.5)
 #: What explains it within so little of the best explains it as well.
 ALIKE = 0.02
 #: Length of the mean direction of the courses: above it the aircraft flew straight on, and one constant angle
@@ -468,8 +470,10 @@ def heading(flight: Flight) -> Iterator[Finding]:
             if aside and after >= FOLLOWS and leans(undone, acceleration)[0] > max(LEANS, leant + LEANS / 2):
                 turned.append((after, one))
             if apart.max() < LEANS / 2 and (after >= FOLLOWS or before < FOLLOWS):
-                lean = leans(undone, acceleration, velocity)
-                leaning += [(lean[0], one)] if lean.min() > LEANS else []
+                lean, size = leaning_of(undone, acceleration, velocity)
+                # A vessel heels outward, and less: that is no mistake.
+                right = lean.min() > LEANS and COORDINATED[0] < size[0] < COORDINATED[1]
+                leaning += [(lean[0], one)] if right else []
         for found, code, was, first in (
             # Of the heading only the yaw is asked about: mistakes about it come first.
             (turned, "heading-not-course", before, "yaw"),
@@ -512,20 +516,28 @@ def follows(R: Array, course: Array) -> float:
 
 
 def leans(R: Array, acceleration: Complex, *others: Complex) -> Array:
-    """Correlation, -1 to 1, between how the upper side leans in n and the level accelerations, of the whole
-    and of each half, (3,), less what goes with others.
+    """The correlation of `leaning_of`."""
+    return leaning_of(R, acceleration, *others)[0]
+
+
+def leaning_of(R: Array, acceleration: Complex, *others: Complex) -> Array:
+    """Correlation, -1 to 1, between how the upper side leans in n and the level accelerations, and how much
+    it leans as a share of a coordinated turn; of the whole and of each half, (2, 3), less what goes with
+    others.
 
     With the velocity go the drag, against which an airframe leans, too, and a steady circle, on which each of
     its directions is a constant turn from the acceleration.
     """
     A = np.column_stack([np.ones(len(R)), *others])
 
-    def together(_: NDArray[np.bool_], rows: NDArray[np.bool_]) -> tuple[float]:
+    def together(_: NDArray[np.bool_], rows: NDArray[np.bool_]) -> tuple[float, float]:
         lean, gained = (
             part[rows] - A[rows] @ np.linalg.lstsq(A[rows], part[rows], rcond=None)[0]
             for part in (-R[:, 0, 2] - 1j * R[:, 1, 2], acceleration)
         )
         size = np.linalg.norm(lean) * np.linalg.norm(gained)
-        return (float((lean @ gained.conj()).real / size) if size > 0 else 0.0,)
+        alike = float((lean @ gained.conj()).real / size) if size > 0 else 0.0
+        ratio = np.linalg.norm(lean) / np.linalg.norm(gained) if size > 0 else 0.0
+        return alike, alike * float(ratio) * USUAL_GRAVITY
 
-    return crosswise(len(R), 10, together)[0]
+    return crosswise(len(R), 10, together)
