@@ -3,6 +3,7 @@
 import json
 import re
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from tests import commands
 from tests.analysis.test_plan import FIELD
 from tests.flight.test_area import LAT, LON, collection, feature, polygon
 from tests.flight.test_mission_writers import check_plan, read_wpl
+from wildlab.reporting.plan import roomiest_place
 
 call, succeed, refuse = (partial(one, "plan") for one in (commands.call, commands.succeed, commands.refuse))
 SHEET = ("--image", "640x512", "--view", "45")
@@ -153,3 +155,13 @@ def test_maps_that_do_not_fit_are_refused(over_map, tmp_path):
     assert "% of Wolf" in refused(write_map(folder / "holes.tif", holes, corner))
     assert "no map" in refuse(area, *SHEET, "--terrain-crs", "EPSG:32633", *into)
     assert not (tmp_path / "out").exists()
+
+
+def test_the_name_of_an_area_stands_in_the_area_and_not_in_its_hole():
+    inside = np.ones((21, 41), bool)
+    inside[4:17, 12:30] = False
+    cells = SimpleNamespace(inside=inside, north=-100.0, east=300.0, step=10.0)
+    north, east = roomiest_place(cells)
+    # To the west and the north of the hole there are 12 and 4 columns and rows, to the east 11.
+    row, column = int((north + 100) / 10), int((east - 300) / 10)
+    assert inside[row, column] and 4 <= column <= 7 and 4 <= row <= 16

@@ -6,6 +6,7 @@ A track is judged where its target was seen; where it was not is a number of its
 from __future__ import annotations
 
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -203,3 +204,19 @@ def test_a_track_that_lost_its_target_is_judged_where_the_target_was_seen():
     flight.tables["detections"].loc[119:, "range_m"] += 6.0  # after a minute
     row = rows_of(tracker.track(flight, settings=parse_settings(KNOWN))).loc["ekf"]
     assert row["compared"] > row["used"]
+
+
+def test_each_gap_is_asked_about_the_place_before_it(monkeypatch):
+    """Seen bent north of zero alone: a track that was last there ends, whatever was asked before."""
+
+    def bend_of(_):
+        return lambda row, place: (np.full((2, 2, 2), 100.0 * (place[0] > 0)), np.eye(2))
+
+    monkeypatch.setattr(single_target, "bend_of", bend_of)
+    inputs = {"camera": SimpleNamespace(noise=SimpleNamespace(longest_gap_s=1.0))}
+    none = np.zeros(9, int)
+    merged = SimpleNamespace(times=np.arange(9.0), which=none, rows=np.arange(9))
+    ends = single_target.ends_of(inputs, merged, {"camera": np.full((9, 1, 2), np.nan)})
+    south, north = np.array([-5.0, 0.0, 0.0, 0.0]), np.array([5.0, 0.0, 0.0, 0.0])
+    asked = [(3, 0, south), (4, 0, south), (8, 5, north), (8, 5, south), (6, 5, north)]
+    assert [ends(row, last, x, np.eye(4)) for row, last, x in asked] == [False, False, True, False, False]

@@ -131,11 +131,7 @@ def _show_map(wording: Wording, plan: Plan, covered: Sequence[Covered], result: 
     shown = {kind for one in covered for kind in _draw_covered(ax, one)}
     for area, name, cells in zip(plan.areas.areas, plan.names, covered, strict=True):
         draw_fences(ax, [area.outline, *area.holes])
-        # Furthest from all fences: the middle may lie in a hole.
-        room = distance_transform_edt(np.pad(cells.inside, 1))[1:-1, 1:-1]
-        row, column = np.unravel_index(np.argmax(room), room.shape)
-        place = np.array([cells.north + row * cells.step, cells.east + column * cells.step])
-        mark_place(ax, place, name, below=True)
+        mark_place(ax, roomiest_place(cells), name, below=True)
     many = len(plan.sorties) > NAMED
     for k, one in enumerate(plan.sorties):
         colour = FLIGHTS[k % len(FLIGHTS)]
@@ -166,6 +162,13 @@ def _show_map(wording: Wording, plan: Plan, covered: Sequence[Covered], result: 
         "each": each,
     }
     wording.figure("map", fig, main=True)
+
+
+def roomiest_place(cells: Covered) -> Array:
+    """(2,) m north and east: furthest from all fences of an area, whose middle may lie in a hole."""
+    room = distance_transform_edt(np.pad(cells.inside, 1))[1:-1, 1:-1]
+    row, column = np.unravel_index(np.argmax(room), room.shape)
+    return np.array([cells.north + row * cells.step, cells.east + column * cells.step])
 
 
 def _draw_covered(ax: Axes, one: Covered) -> set[int]:
