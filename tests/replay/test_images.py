@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from PIL import Image
 
 from wildlab.replay import images as shots
-from wildlab.replay.images import read_shots
+from wildlab.replay.images import frames_of, read_shots
 
 
 def picture(path: Path, level: int, size: tuple[int, int] = (64, 48)) -> None:
@@ -57,3 +58,16 @@ def test_all_of_them_fit(tmp_path, monkeypatch):
     # The first and last of all, half of them where something was seen.
     assert sorted(found.by_row) == [0, 4, 5, 6, 7, 11] and "6 of 12" in found.lacks[0]
     assert sum(map(len, found.by_row.values())) <= 120_000 and seen[-1] == (6, 6)
+
+
+def test_images_in_the_flight_s_folder_stand_at_the_rows_that_name_them(tmp_path):
+    flight = SimpleNamespace(folder=tmp_path)
+    assert frames_of(flight, ["a"]) == {}
+    (tmp_path / "images").mkdir()
+    assert frames_of(flight, ["a"]) == {}
+    for name, level in (("a", 60), ("b", 180)):
+        picture(tmp_path / "images" / f"{name}.png", level)
+    found = frames_of(flight, ["c", "b", "a.png"])
+    levels = {row: float(np.median(image)) for row, image in found.items()}
+    assert levels == pytest.approx({1: 180, 2: 60}, abs=3)
+    assert frames_of(SimpleNamespace(folder=None), ["a"]) == {}

@@ -10,6 +10,7 @@ import pytest
 
 from wildlab.reporting import georeferencing
 from wildlab.reporting.georeferencing import truth_errors
+from wildlab.reporting.georeferencing_tables import worst_sightings
 
 
 def test_names_that_may_tell_of_a_place_are_numbered_unless_it_is_open():
@@ -63,3 +64,18 @@ def test_an_offset_of_the_camera_s_clock_is_parted_from_its_zone():
     # A zone is read from the hours of the flight, and no point is fitted.
     for said in (limits_with(0.0), limits_with(-45900.0), limits_with(0.4, "twin")):
         assert "limit-clock-fitted" not in said
+
+
+def test_of_each_of_the_worst_images_the_detection_that_is_furthest_off_is_shown():
+    points = pd.DataFrame({
+        "detection_id": ["d1", "d2", "d3", "d4"], "frame_id": ["f1", "f1", "f2", "f3"],
+        "error_m": [8.0, 2.0, 7.0, np.nan],
+    })  # fmt: skip
+    pixels = pd.DataFrame(
+        {"detection_id": ["d4", "d3", "d2", "d1"], "u_px": [4.0, 3, 2, 1], "v_px": [40.0, 30, 20, 10]}
+    )
+    found = worst_sightings(SimpleNamespace(table=lambda _: pixels), points)
+    assert found[["image", "u_px", "v_px", "line"]].to_numpy().tolist() == [
+        ["f2", 3, 30, "1: 7.0 m"],
+        ["f1", 1, 10, "2: 8.0 m"],
+    ]

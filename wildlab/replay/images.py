@@ -1,4 +1,4 @@
-"""Images of a flight for its replay: reduced, and JPEG without a word on where and when they were taken.
+"""Images of a flight for its pages: reduced, and JPEG without a word on where and when they were taken.
 
 The pixels alone are kept: an image is decoded and written anew, so nothing else in its file comes along.
 """
@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.readers.frames import Frame, open_frames
+from wildlab.flight.readers.frames import Frame, Frames, open_frames
 from wildlab.flight.readers.frames.image import file_name, frame_name
+from wildlab.flight.store import Flight
 
 #: Pictures of a page and their bytes, at most: below 3 MB a phone opens it at once; the longest side, px.
 MOST_PICTURES, MOST_BYTES, LONGEST, QUALITY = 120, 800_000, 960, 70
@@ -60,14 +61,7 @@ def read_shots(
     WildlabError
         Where the folder is not there, or holds no image of these frames.
     """
-    frames = open_frames(folder, ids=[str(one) for one in ids])
-    names: Iterable[str] = map(file_name, frames.files)
-    if not frames.files:
-        names = (frame_name(folder, number) for number in range(frames.count or 0))
-    rows = {str(name): row for row, name in reversed(list(enumerate(ids)))}
-    stems = {Path(name).stem: row for name, row in reversed(list(rows.items()))}
-    found = [(number, rows.get(name, stems.get(Path(name).stem))) for number, name in enumerate(names)]
-    numbers = {number: row for number, row in found if row is not None}
+    frames, numbers = _match_frames(folder, ids)
     if not numbers:
         raise WildlabError(
             "none of these images is one of the flight's frames",
@@ -90,6 +84,37 @@ def read_shots(
             taken[numbers[int(number)]] = jpeg_of(frame, MOST_BYTES // len(wanted))
         progress(done, len(wanted))
     return Shots(taken, (*lacks, *(f"{count} images: {why}" for why, count in amiss.items())))
+
+
+def images_of(flight: Path | None) -> Path | None:
+    """The folder of a flight's images, where it holds one."""
+    folder = None if flight is None else flight / "images"
+    return folder if folder is not None and folder.is_dir() else None
+
+
+def frames_of(flight: Flight, ids: Sequence[object]) -> dict[int, NDArray[Any]]:
+    """Images (H, W) or (H, W, 3) in the flight's folder, by the row of ``ids`` that names them."""
+    folder = images_of(flight.folder)
+    if folder is None:
+        return {}
+    try:
+        frames, numbers = _match_frames(folder, ids)
+    except WildlabError:  # The folder holds no images.
+        return {}
+    found = zip(numbers.values(), frames.some(list(numbers)), strict=True)
+    return {row: frame.image for row, frame in found if frame.usable}
+
+
+def _match_frames(folder: Path, ids: Sequence[object]) -> tuple[Frames, dict[int, int]]:
+    """Frames of a folder or a video, and by the number of one the row of ``ids`` that names it."""
+    frames = open_frames(folder, ids=[str(one) for one in ids])
+    names: Iterable[str] = map(file_name, frames.files)
+    if not frames.files:
+        names = (frame_name(folder, number) for number in range(frames.count or 0))
+    rows = {str(name): row for row, name in reversed(list(enumerate(ids)))}
+    stems = {Path(name).stem: row for name, row in reversed(list(rows.items()))}
+    found = [(number, rows.get(name, stems.get(Path(name).stem))) for number, name in enumerate(names)]
+    return frames, {number: row for number, row in found if row is not None}
 
 
 def spread_evenly(n: int, most: int) -> NDArray[np.intp]:

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from wildlab.analysis import Fact
 from wildlab.analysis.accuracy import Accuracy, Repeats, on_one_heading
@@ -34,6 +35,7 @@ from wildlab.flight.store import Flight
 from wildlab.messages.catalogue import Message, PageTexts, load_texts, words
 from wildlab.messages.quantities import measure, percent_of, significant
 from wildlab.names import listed
+from wildlab.reporting.charts.drawing import sightings_chart
 from wildlab.reporting.charts.tracks import error_map, error_scatter, error_shares, errors_by_image
 from wildlab.reporting.figures import colour
 from wildlab.reporting.georeferencing_tables import (
@@ -49,6 +51,7 @@ from wildlab.reporting.georeferencing_tables import (
     parts_table,
     simplest_rivals,
     worst_images,
+    worst_sightings,
 )
 from wildlab.reporting.notebook_pages import ADVICE
 from wildlab.reporting.published import load_published
@@ -411,6 +414,7 @@ def show_accuracy(
     amiss: Sequence[str],
     applied: Sequence[Fact] = (),
     source: str | None = None,
+    pictures: Mapping[int, NDArray[Any]] | None = None,
 ) -> None:
     """Write the page.
 
@@ -430,6 +434,8 @@ def show_accuracy(
         Facts on the calibration of another flight that was applied.
     source
         Name of the poses' ``nav`` table; None for the flight's own.
+    pictures
+        The worst images, (H, W) or (H, W, 3), by the row of `worst_sightings`, as far as they are at hand.
     """
     texts, shown = load_texts("georeferencing"), flight.manifest.locations.sensitivity == "open"
     programs = named(programs, "program", shown=shown)
@@ -457,6 +463,8 @@ def show_accuracy(
         worst = worst_images(found.scored)
         wording.figure("error-map", error_map(found.scored, list(worst["image"])))
         wording.table("worst", worst)
+        if pictures:
+            wording.figure("worst-pictures", sightings_chart(worst_sightings(flight, found.scored), pictures))
         rows = {texts.subjects["applied" if applied else "logged"]: logged}
         rows |= _other_summaries(found, texts)
         rows |= {texts.subjects["recorded"].format(program): one for program, one in others.items()}

@@ -13,8 +13,10 @@ from wildlab.analysis.georeference import errors_of
 from wildlab.evaluation.correlated_errors import WanderNoise
 from wildlab.evaluation.errors import AlongAxis, ErrorSummary, summarise
 from wildlab.evaluation.outliers import Outlier
+from wildlab.flight.store import Flight
 from wildlab.geometry.calibration import BORESIGHT, Calibration
 from wildlab.messages.catalogue import load_texts
+from wildlab.messages.quantities import length
 from wildlab.reporting.report import Report
 
 #: Rows of the table of models, and of that of the worst images.
@@ -64,6 +66,16 @@ def worst_images(scored: pd.DataFrame) -> pd.DataFrame:
     each = scored.dropna(subset=["error_m"]).groupby("frame_id", sort=False)["error_m"]
     found = each.agg(["count", "mean", "max"]).nlargest(MOST_IMAGES, "mean").reset_index(names="image")
     return found.assign(number=np.arange(len(found)) + 1)
+
+
+def worst_sightings(flight: Flight, scored: pd.DataFrame) -> pd.DataFrame:
+    """The detection that is furthest off in each of the `worst_images`, with its pixel and a ``line``."""
+    worst = worst_images(scored)
+    furthest = scored.loc[scored.groupby("frame_id")["error_m"].idxmax().dropna()].set_index("frame_id")
+    pixels = flight.table("detections").set_index("detection_id")[["u_px", "v_px"]]
+    found = worst.join(furthest.loc[worst["image"]].join(pixels, on="detection_id"), on="image")
+    lines = [f"{n}: {length(m)}" for n, m in zip(found["number"], found["error_m"], strict=True)]
+    return found.assign(line=lines)
 
 
 def beside_published(published: pd.DataFrame, theirs: ErrorSummary, ours: ErrorSummary) -> pd.DataFrame:

@@ -18,7 +18,7 @@ from wildlab.files import write_atomic
 from wildlab.flight.manifest import FILE_NAME
 from wildlab.flight.store import Flight, load_flight
 from wildlab.paths import REPORTS
-from wildlab.replay.images import read_shots
+from wildlab.replay.images import images_of, read_shots
 from wildlab.replay.page import page
 from wildlab.replay.recording import save_recording
 from wildlab.replay.scene import ReplayScene, scene_of
@@ -90,8 +90,7 @@ def replay(
 def _with_images(
     scene: ReplayScene, flight: Path, images: Path | None, tell: Any
 ) -> tuple[ReplayScene, dict[int, bytes]]:
-    own = flight / "images"
-    place = images or (own if own.is_dir() else None)
+    place = images or images_of(flight)
     if scene.views is None:
         return scene, {}
     if place is None:

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
@@ -43,6 +44,8 @@ LINES = (BLUE, VERMILLION, GREEN, PURPLE, SKY)
 #: Lines of a level, an ideal or a limit, and of the truth, which is drawn last so that tracks show through.
 DASHED: dict[str, Any] = {"lw": 1.0, "ls": (0, (4, 3))}
 TRUTH: dict[str, Any] = {"color": "#000000", "width": 1.1, "ls": (0, (4, 2))}
+#: What is shown around a detection, px to each side.
+AROUND = 40
 #: Behind words that lie on lines.
 _BOX = {"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.8}
 
@@ -298,6 +301,28 @@ def draw_picture(
     ax.set(xlim=(-0.5, image.shape[1] - 0.5), ylim=(image.shape[0] - 0.5, -0.5), xticks=[], yticks=[])
     ax.grid(visible=False)
     ax.set_title(title)
+
+
+def sightings_chart(sightings: pd.DataFrame, images: Mapping[int, NDArray[Any]]) -> Figure:
+    """What the camera saw around detections, five side by side.
+
+    Parameters
+    ----------
+    sightings
+        ``u_px``, ``v_px`` and ``line``, which stands above it.
+    images
+        (H, W) or (H, W, 3) by the row of the sightings; others are left out.
+    """
+    fig, axes = new_figure(
+        7.2, 1.7 * -(-len(images) // 5), rows=-(-len(images) // 5), columns=5, squeeze=False
+    )
+    for ax in axes.flat[len(images) :]:
+        ax.set_axis_off()
+    for ax, row in zip(axes.flat, sorted(images), strict=False):
+        u, v, line = sightings[["u_px", "v_px", "line"]].iloc[row]
+        draw_picture(ax, images[row], line, limits=None, boxes=[(u, v, 0, 0)], colors=[SKY], margin=12)
+        ax.set(xlim=(u - AROUND, u + AROUND), ylim=(v + AROUND, v - AROUND), facecolor=GREY)
+    return fig
 
 
 def fields_chart(
