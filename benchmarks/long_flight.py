@@ -142,7 +142,7 @@ def run() -> tuple[str, list[tuple[str, float, float, str]]]:
     """The commands; a ratio here is what was used to what is allowed."""
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
-        writer = multiprocessing.get_context("spawn").Process(target=write_tables, args=(folder,))
+        writer = multiprocessing.get_context("spawn").Process(target=write_tables, args=(folder, HOURS))
         writer.start()
         writer.join()
         flight = str(folder / "flight")
