@@ -41,7 +41,7 @@ else:
 # jsonschema does without the package where it is not installed.
 sys.modules.setdefault("rfc3987_syntax", None)  # type: ignore[arg-type]
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__ = [
     "Flight",
