@@ -180,3 +180,15 @@ def test_a_changed_manifest_is_told_in_the_report(tmp_path):
     report.summary(["An answer."])
     page = html.report_page(notebook_of(report), study="test", alert=changed_notice(about))
     assert page.index("</h1>") < page.index("flight.toml of") and "data-part" not in page
+
+
+def test_a_flight_is_told_by_its_tables_and_not_by_its_images(tmp_path):
+    told = {"flight.toml", "truth.parquet", "nav/mekf.parquet"}
+    for name in (*told, "images/a.png", "images/deeper/b.png"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_bytes(name.encode())
+    assert set(provenance_of_flight(tmp_path)["files"]) == {
+        "flight.toml",
+        "truth.parquet",
+        "nav/mekf.parquet",
+    }

@@ -117,12 +117,17 @@ def read_provenance(report: Path) -> dict[str, Any]:
 
 
 def provenance_of_flight(folder: Path) -> dict[str, Any]:
-    """What provenance says of a flight: its name, its kind, and what its files and raw files are told by."""
+    """What provenance says of a flight: its name, its kind, and what its files and raw files are told by.
+
+    Its images are no part of it: they may be a link to gigabytes, and no number comes from them.
+    """
     try:
         manifest = tomllib.loads((folder / "flight.toml").read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
         manifest = {}
-    files = sorted(path for path in folder.rglob("*") if path.is_file() and not path.is_symlink())
+    parts = (part for part in folder.iterdir() if part.name != "images") if folder.is_dir() else ()
+    below = (path for part in parts for path in (part, *part.rglob("*")))
+    files = sorted(path for path in below if path.is_file() and not path.is_symlink())
     try:
         changed = manifest_changed(folder)
     except WildlabError:
