@@ -149,6 +149,7 @@ def test_thresholds_come_back_from_their_file(tmp_path):
         detect_frame(read_image(tmp_path / "none.png"), "magic", Contrast())
 
 
+@pytest.mark.slow
 def test_a_classifier_of_shapes_learns_what_a_size_cannot_tell(tmp_path):
     """Animals and fence posts of the same area and warmth: the one is round, the other long."""
     samples = []

@@ -78,6 +78,7 @@ def off_after(one: SensorTrack) -> float:
     return float(np.sqrt(np.mean(np.sum(one.error[again, :2] ** 2, axis=1))))
 
 
+@pytest.mark.slow
 def test_a_track_through_a_long_gap_finds_its_target_again(monkeypatch):
     on_ground = NOISE_PX / CAMERA.fx * HEIGHT / np.cos(TILT) ** 2
     followed = follow()

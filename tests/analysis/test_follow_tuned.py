@@ -31,6 +31,7 @@ def by_filterpy(z, t, density, sd, x, P):
     return kf, *(np.array(one) for one in zip(*steps, strict=True))
 
 
+@pytest.mark.slow
 def test_tracks_smoothers_and_their_numbers_are_those_of_another_program():
     """Tuned on one flight, judged on another: filterpy's filter and smoother, and sums written out."""
     tuned = tune_flight(

@@ -90,6 +90,7 @@ def rms(values: np.ndarray) -> np.ndarray:
     return np.sqrt((values**2).mean(axis=0))
 
 
+@pytest.mark.slow
 def test_thor_in_the_air(thor):
     flight, found = thor
     mekf = found["mekf"]

@@ -56,11 +56,13 @@ def test_what_is_right_is_not_accused_however_few_are_known(flown, count):
     assert told(replace(few(flown, count), manifest=nearest)) == []
 
 
+@pytest.mark.slow
 def test_where_few_are_known_a_share_that_grows_proves_nothing(flown):
     """Negated yaw, and undone: of 1 of 25 animals a share is too small to be told from others'."""
     assert told(few(turned(flown, lambda a: a * [1, 1, -1]), 1)) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("before", "accused"), [(0.29, True), (0.31, False)])
 def test_what_meets_targets_often_enough_needs_no_explanation(flown, monkeypatch, before, accused):
     """As where a mount is off by a few degrees, which another mistake may make up for."""
