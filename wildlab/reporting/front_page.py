@@ -445,7 +445,7 @@ def front_page(
         learn=learn,
         checkout=checkout,
         close=published.MARGIN,
-        legend=published.marks_legend(n for one in study_cards for n in one.numbers),
+        marked=any(one.numbers for one in study_cards),
         # How many studies are done is said above.
         counts=_tiles(studies)[1:],
         pages={"flights": FLIGHTS, "partners": PARTNERS, "ledger": LEDGER},
