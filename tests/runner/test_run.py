@@ -238,7 +238,7 @@ def body(pipe, job, begun):
         child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(300)"])
         Path(begun).touch()
         child.wait()
-        return ("done",)
+        return ("done", None)
     notebook_process._outcome = outcome
     shutil.rmtree = lambda folder, **more: (time.sleep(1.0), remove(folder, **more))
     notebook_process.run_notebook(pipe, job)

@@ -16,7 +16,7 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic
@@ -75,8 +75,7 @@ class Job:
         return {self.work: ".", around: "[flights]", self.flight: f"[flight {self.flight_name}]"}
 
 
-@dataclass(frozen=True)
-class Failure:
+class Failure(NamedTuple):
     """Why a job failed: a sentence, the step, and the traceback for whoever mends it."""
 
     reason: str

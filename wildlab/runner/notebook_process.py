@@ -1,69 +1,56 @@
-"""One study in a process of its own: flight, notebook, page. `wildlab.runner.run` starts, watches and
+"""One study in a process of its own: flight, notebook, page. `wildlab.runner.scheduling` starts, watches and
 ends it.
 
 A process each, because papermill changes the working directory of the whole process, and because only a
-process can be ended for certain. It gets its own session, so that Ctrl-C reaches the runner alone, which
-then ends everything below this process, kernel included.
+process can be ended for certain.
 """
 
 from __future__ import annotations
 
 import os
 import shutil
-import signal
-import threading
 import time
-from multiprocessing import connection, parent_process
+from multiprocessing import connection
 from pathlib import Path
 from typing import Any
 
 from wildlab.errors import WildlabError
 from wildlab.paths import ROOT
 from wildlab.runner.job import Failure, Job
-from wildlab.runner.processes import end_below
+from wildlab.runner.processes import end_with_runner, runner_is_gone
 
 #: The cells begun in this process, in order.
 _STARTED: list[int] = []
 
 
 def run_notebook(pipe: connection.Connection, job: Job) -> None:
-    """Body of the process. Sends ``("stage", text)``, ``("cell", index, count)`` and at last ``("done",)`` or
-    ``("failed", Failure)``."""
-    os.setsid()
-    tidying = threading.Thread(target=_end_with_parent, args=(job,), daemon=True)
-    tidying.start()
+    """Body of the process. Says ``("stage", (text,))``, ``("cell", (index, count))`` and at last
+    ``("done", None)`` or ``("failed", Failure)``."""
+    ended = end_with_runner(lambda: _remove(job))
     try:
         pipe.send(_outcome(pipe, job))
     except OSError:
-        if not _parent_is_gone(timeout_s=1.0):
+        if not runner_is_gone(timeout_s=1.0):
             raise
-        tidying.join()  # it ends this process when nothing is left of the work
+        ended.join()  # it ends this process when nothing is left of the work
 
 
-def _outcome(pipe: connection.Connection, job: Job) -> tuple[str] | tuple[str, Failure]:
+def _outcome(pipe: connection.Connection, job: Job) -> tuple[str, Failure | None]:
     try:
         _keep_to_ourselves(job)
         (_tutorial if job.tutorial else _work)(pipe, job)
     except BaseException as error:  # whatever it is, the runner must hear of it
-        return ("failed", _explain(error, job))
-    return ("done",)
+        return "failed", _explain(error, job)
+    return "done", None
 
 
-def _parent_is_gone(timeout_s: float | None) -> bool:
-    parent = parent_process()
-    return parent is not None and bool(connection.wait([parent.sentinel], timeout_s))
-
-
-def _end_with_parent(job: Job) -> None:
-    """A runner that was killed outright must leave neither processes nor a folder behind."""
-    if _parent_is_gone(timeout_s=None):
-        end_below(os.getpid())
-        for _ in range(100):  # the notebook may write into it until it finds it gone
-            shutil.rmtree(job.work, ignore_errors=True)
-            if not Path(job.work).exists():
-                break
-            time.sleep(0.01)
-        os.kill(os.getpid(), signal.SIGKILL)
+def _remove(job: Job) -> None:
+    """Remove the work's folder for good: the notebook may write into it until it finds it gone."""
+    for _ in range(100):
+        shutil.rmtree(job.work, ignore_errors=True)
+        if not Path(job.work).exists():
+            break
+        time.sleep(0.01)
 
 
 def _keep_to_ourselves(job: Job) -> None:
@@ -97,7 +84,7 @@ def _work(pipe: connection.Connection, job: Job) -> None:
 
     started = time.monotonic()
     folder = Path(job.work)
-    pipe.send(("stage", "flight"))
+    pipe.send(("stage", ("flight",)))
     flight, others = _flight(job), _others(job)
     given: dict[str, Any] = {**job.parameters, "study": job.name, "seed": job.seed}
     origin = provenance.collect(
@@ -113,7 +100,7 @@ def _work(pipe: connection.Connection, job: Job) -> None:
     if job.seeds is not None:
         origin["seeds"] = job.seeds.provenance()
     write_json(folder / "provenance.json", origin)
-    pipe.send(("stage", "notebook"))
+    pipe.send(("stage", ("notebook",)))
     shown = {**given, "flight": _relative(flight, job), "out": "."}
     if others:
         given[OTHERS] = [str(other) for other in others]
@@ -127,7 +114,7 @@ def _work(pipe: connection.Connection, job: Job) -> None:
                 notebook_pages.read_notebook(executed), shown, job.hidden()
             )
             notebook_pages.write_notebook(executed, cleaned)
-    pipe.send(("stage", "page"))
+    pipe.send(("stage", ("page",)))
     if not (folder / "metrics.json").is_file():
         raise WildlabError(
             "the notebook wrote no metrics.json", "end it with report.save()", file=Path(job.notebook).name
@@ -158,9 +145,9 @@ def _tutorial(pipe: connection.Connection, job: Job) -> None:
     from wildlab.reporting import notebook_pages
     from wildlab.runner import provenance
 
-    pipe.send(("stage", "notebook"))
+    pipe.send(("stage", ("notebook",)))
     notebook = _execute(pipe, job, {}, Path(job.work) / "notebook.ipynb")
-    pipe.send(("stage", "page"))
+    pipe.send(("stage", ("page",)))
     cleaned = notebook_pages.clean_notebook(notebook, {}, {job.work: "."})
     origin = provenance.collect(
         study=job.name, notebook=Path(job.notebook), flight=None, parameters={}, seed=None
@@ -208,7 +195,7 @@ def _execute(pipe: connection.Connection, job: Job, parameters: dict[str, Any], 
 
     def on_cell(index: int, count: int) -> None:
         _STARTED.append(index)
-        pipe.send(("cell", index, count))
+        pipe.send(("cell", (index, count)))
 
     notebook = read_notebook(Path(job.notebook))
     return execute_notebook(notebook, Path(job.notebook).parent, executed, parameters, on_cell)
