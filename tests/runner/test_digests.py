@@ -19,7 +19,7 @@ from wildlab.flight.store import load_flight, save_flight
 from wildlab.reporting import notebook_pages as html
 from wildlab.reporting.metrics import metric
 from wildlab.reporting.report import open_report
-from wildlab.runner.compare import compare_flights
+from wildlab.runner.evaluate import compare_flights
 from wildlab.runner.job import FILES
 from wildlab.runner.ledger import own_flights
 from wildlab.runner.provenance import changed_notice, footer, provenance_of_flight, verify_report

@@ -18,10 +18,9 @@ from wildlab.flight.manifest import parse_settings
 from wildlab.flight.store import CALIBRATION, Flight, save_flight
 from wildlab.reporting.front_page import OwnFlight
 from wildlab.reporting.metrics import AGAINST
-from wildlab.runner.evaluate import evaluate_flight
+from wildlab.runner.evaluate import evaluate_flight, track_many
 from wildlab.runner.ledger import ABOUT, finished_metrics, own_flights
 from wildlab.runner.scheduling import Outcome
-from wildlab.runner.track import track_many
 from wildlab.sharing.generalisation import Generalised, Names, neutral_learnt, neutral_settings
 from wildlab.sharing.reports import ENDS, MANY, Source
 from wildlab.sharing.tiers import describe

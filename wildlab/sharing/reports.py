@@ -11,6 +11,7 @@ from wildlab.errors import WildlabError
 from wildlab.flight.manifest import FILE_NAME, read_manifest
 from wildlab.paths import REPORTS
 from wildlab.runner.catalogue import StudyEntry
+from wildlab.runner.evaluate import MANY_NOTEBOOK
 from wildlab.runner.job import typed
 from wildlab.runner.ledger import ABOUT
 from wildlab.runner.provenance import (
@@ -21,7 +22,6 @@ from wildlab.runner.provenance import (
     same_flight,
 )
 from wildlab.runner.status import BEFORE_DIGESTS, has_digests, read_status
-from wildlab.runner.track import MANY_NOTEBOOK
 from wildlab.simulation.parameters import load_twin, twin_names
 
 #: What the names of the reports on a flight end in, in the order in which they are read.
