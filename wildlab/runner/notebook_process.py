@@ -16,6 +16,7 @@ from typing import Any
 
 from wildlab.errors import WildlabError
 from wildlab.paths import ROOT
+from wildlab.runner.catalogue import OTHERS, dataset_flight, twin_flight
 from wildlab.runner.job import Failure, Job
 from wildlab.runner.processes import end_with_runner, runner_is_gone
 
@@ -80,7 +81,6 @@ def _work(pipe: connection.Connection, job: Job) -> None:
     from wildlab.reporting.status import describe_first_look
     from wildlab.reporting.text import first_look_notice
     from wildlab.runner import provenance
-    from wildlab.runner.catalogue import OTHERS
 
     started = time.monotonic()
     folder = Path(job.work)
@@ -159,8 +159,6 @@ def _tutorial(pipe: connection.Connection, job: Job) -> None:
 
 
 def _flight(job: Job) -> Path | None:
-    from wildlab.runner.flights import dataset_flight, twin_flight
-
     if job.flight:
         return Path(job.flight)
     if job.twin:
@@ -172,8 +170,6 @@ def _flight(job: Job) -> Path | None:
 
 def _others(job: Job) -> list[Path]:
     """The further flights of a study."""
-    from wildlab.runner.flights import dataset_flight
-
     return [dataset_flight(job.dataset, recipe, Path(job.reports)) for recipe in job.beside]
 
 

@@ -26,8 +26,7 @@ from wildlab.messages.catalogue import PageTexts, load_texts
 from wildlab.paths import REPORTS
 from wildlab.reporting.report import Report, open_report
 from wildlab.runner import vary
-from wildlab.runner.catalogue import StudyEntry, find_study, load_studies
-from wildlab.runner.flights import flights_for
+from wildlab.runner.catalogue import StudyEntry, find_study, flights_for, load_studies
 from wildlab.runner.scheduling import compute_seeds
 from wildlab.runner.seeds import (
     make_work,
