@@ -19,8 +19,8 @@ from wildlab.geometry.frames import Array
 from wildlab.reporting.charts.flights import (
     Clock,
     error_bands,
-    lines_chart,
     squares_chart,
+    strips,
 )
 from wildlab.reporting.charts.tracks import error_map, map_shown, speed_and_course
 from wildlab.reporting.georeferencing_tables import worst_images
@@ -121,9 +121,10 @@ SOURCES = ("autopilot", "truth", "mine", "truth-payload", "mekf")
 
 def test_every_source_and_the_ground_have_a_look_of_their_own():
     times = np.arange(3.0)
-    series = {name: (times, times + index) for index, name in enumerate(SOURCES)}
-    figure = lines_chart(series, Clock(0.0, 10.0), "height (m)", ground=(times, times))
+    series = {name: (times, times + index) for index, name in enumerate(("ground", *SOURCES))}
+    figure = strips({"height (m)": series}, Clock(0.0, 10.0))
     looks = {line.get_label(): (line.get_color(), line.get_linestyle()) for line in figure.axes[0].lines}
+    looks["mekf"] = looks.pop("filter (MEKF)")
     assert set(looks) == {"ground", *SOURCES} and len(set(looks.values())) == len(looks)
     black = {name for name, (color, _) in looks.items() if color == "#000000"}
     assert black == {"truth", "truth-payload"}

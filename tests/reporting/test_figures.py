@@ -59,9 +59,9 @@ def walk(rng: np.random.Generator, *shape: int) -> np.ndarray:
 
 
 def strips_of(rng: np.random.Generator) -> Figure:
-    one = {"roll (°)": walk(rng, 181), "pitch (°)": walk(rng, 181)}
-    sources = dict.fromkeys(("mekf", "truth", "autopilot", "observer"), (TIMES, one))
-    return flights.strips(sources)
+    sources = ("mekf", "truth", "autopilot", "observer")
+    angles = {label: dict.fromkeys(sources, (TIMES, walk(rng, 181))) for label in ("roll (°)", "pitch (°)")}
+    return flights.strips(angles)
 
 
 def scored(rng: np.random.Generator) -> pd.DataFrame:

@@ -297,13 +297,16 @@ def flight_figures(studied: Studied, window: Period, figures: int | None) -> lis
     )
     _, velocity = poses_between(moving, *window)
     speeds = {
-        name: (times, {"speed over ground (m/s)": np.sqrt(sum(np.square(one) for one in parts.values()))})
-        for name, (times, parts) in velocity.items()
+        name: (
+            velocity["north (m/s)"][name][0],
+            np.sqrt(sum(np.square(one[name][1]) for one in velocity.values())),
+        )
+        for name in moving
     }
     shown = {
         "attitude": (0, strips(attitude)),
         "velocity": (1, strips(velocity)),
-        "speed": (4, strips(speeds)),
+        "speed": (4, strips({"speed over ground (m/s)": speeds})),
     }
     return [
         _marked(studied, fig, text, "" if figures is None else f"fig-7-{figures + offset}")
