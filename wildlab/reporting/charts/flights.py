@@ -13,7 +13,6 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from wildlab.analysis.overview import TROUBLES, Coverage, Issue, Path
-from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.evaluation.streams import FINE, HARMFUL, Pace
 from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
 from wildlab.names import figure_name
@@ -42,7 +41,6 @@ from wildlab.reporting.figures import (
     SKY,
     VERMILLION,
     colour,
-    log_band,
     map_axes,
     new_figure,
     thinned,
@@ -168,23 +166,6 @@ def bias_chart(times: ArrayLike, biases: ArrayLike, sd: ArrayLike) -> Figure:
         late = (np.abs(b) + two)[len(b) // 10 :, part]
         ax.set_ylim(*(np.array([-1.1, 1.1]) * float(np.nanmax(late, initial=0.0))))
         ax.set_ylabel(label)
-    return finish(fig, "time (s)")
-
-
-def squares_chart(series: Mapping[str, tuple[ArrayLike, ArrayLike]], dof: int, what: str) -> Figure:
-    """NIS or NEES over time on log axes, a strip for each series, with the 95 % band of single values.
-
-    ``series`` has times and values by name.
-    """
-    fig, axes = new_strips(len(series), 1.6 * len(series) + 0.4)
-    low, high = chi_square_interval(dof)
-    for ax, (name, (times, values)) in zip(axes, series.items(), strict=True):
-        v = np.asarray(values, float)
-        draw_line(ax, times, v, BLUE, ls="none", marker=".", ms=2, alpha=0.5, mec="none", rasterized=True)
-        log_band(ax, low, high)
-        lowest, highest = np.nanquantile(v, [0.005, 0.999])
-        ax.set_ylim(min(low / 3, float(lowest)), max(high * 3, float(highest)))
-        ax.set_ylabel(f"{what}\n{name}")
     return finish(fig, "time (s)")
 
 
