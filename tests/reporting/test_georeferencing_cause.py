@@ -18,7 +18,7 @@ from wildlab.analysis.verdict import (
 )
 from wildlab.evaluation.causes import Gain
 from wildlab.evaluation.ellipses import EllipseVerdict
-from wildlab.evaluation.errors import AlongAxis, Scatter, summarise
+from wildlab.evaluation.errors import Scatter, summarise
 from wildlab.evaluation.intervals import Interval
 from wildlab.evaluation.outliers import Outlier
 from wildlab.geometry.calibration import Calibration
@@ -171,13 +171,6 @@ def test_what_is_left_is_sorted_and_its_whole_comes_last():
     unknown = Scatter(nan, nan, nan, np.nan)
     assert not len(tables.parts_table(SimpleNamespace(remaining=unknown)))
     assert tables.outliers_table((FAR,))["photo"].tolist() == ["several"]
-
-
-def test_an_axis_is_constant_by_its_interval():
-    one, other = Interval(3.0, 2.0, 4.0), Interval(1.0, -1.0, 3.0)
-    table = tables.axes_table({"north": AlongAxis(one, 0.5, 9), "east": AlongAxis(other, 0.1, 9)})
-    assert table["lasting"].tolist() == [True, False]
-    assert table["share"].tolist() == [50.0, 10.0]
 
 
 def test_parameters_are_called_different_from_zero_by_their_interval():

@@ -14,7 +14,7 @@ Floating Objects using UAVs with Optical Sensors, doctoral thesis, NTNU 2019.
 - `summarise`, `scatter_by_image`, `bootstrap_interval`: single positions, and why they err;
   `time_blocks`, `block_mean`, `compare_halves`: in blocks in time order.
 - `held_out`, `gain_of`, `rank_models`: which constant error is behind them, `estimate_wander`: against noise
-  that is correlated in time; `split_along`; `find_outliers`.
+  that is correlated in time; `find_outliers`.
 - `judge_ellipses`, `spread_of_sightings`: what they are worth.
 """
 
@@ -49,14 +49,12 @@ if TYPE_CHECKING:
         spread_of_sightings,
     )
     from wildlab.evaluation.errors import (
-        AlongAxis,
         ErrorSummary,
         Scatter,
         TrackErrors,
         TrackSummary,
         bootstrap_interval,
         scatter_by_image,
-        split_along,
         summarise,
         summarise_track,
     )
@@ -78,7 +76,6 @@ else:
 
 __all__ = [
     "ERROR_CONVENTION",
-    "AlongAxis",
     "Average",
     "EllipseVerdict",
     "ErrorSummary",
@@ -124,7 +121,6 @@ __all__ = [
     "scatter_by_image",
     "share_inside",
     "share_interval",
-    "split_along",
     "spread_of_sightings",
     "summarise",
     "summarise_track",

@@ -40,7 +40,6 @@ from wildlab.reporting.charts.tracks import error_map, error_scatter, error_shar
 from wildlab.reporting.figures import colour
 from wildlab.reporting.georeferencing_tables import (
     SUMMARY,
-    axes_table,
     beside_published,
     errors_table,
     groups_table,
@@ -487,8 +486,6 @@ def show_accuracy(
     if groups and logged.n:
         wording.table("groups", groups_table(groups))
     show_models(report, wording, diagnosis)
-    if diagnosis is not None:
-        wording.table("axes", axes_table(found.axes))
     wording.table("parts", parts_table(found))
     if diagnosis is not None:
         wording.table("noise", noise_table(diagnosis.noise, found.assumed))

@@ -11,7 +11,7 @@ from wildlab.analysis.accuracy import Accuracy, corrections
 from wildlab.analysis.diagnose import Diagnosis
 from wildlab.analysis.georeference import errors_of
 from wildlab.evaluation.correlated_errors import WanderNoise
-from wildlab.evaluation.errors import AlongAxis, ErrorSummary, summarise
+from wildlab.evaluation.errors import ErrorSummary, summarise
 from wildlab.evaluation.outliers import Outlier
 from wildlab.flight.store import Flight
 from wildlab.geometry.calibration import BORESIGHT, Calibration
@@ -128,23 +128,6 @@ def parameters_table(report: Report, calibration: Calibration) -> pd.DataFrame:
         shown = {"what": names[name], "unit": "" if unit == "1" else unit, "zero": low <= 0 <= high}
         rows.append(one | shown)
     return pd.DataFrame(rows)
-
-
-def axes_table(axes: Mapping[str, AlongAxis]) -> pd.DataFrame:
-    """Mean error along each axis, and whether it lasts."""
-    return pd.DataFrame(
-        [
-            {
-                "axis": name,
-                "mean": one.mean.estimate,
-                "low": one.mean.low,
-                "high": one.mean.high,
-                "share": 100 * one.share,
-                "lasting": one.constant,
-            }
-            for name, one in axes.items()
-        ]
-    )
 
 
 def outliers_table(outliers: Sequence[Outlier]) -> pd.DataFrame:
