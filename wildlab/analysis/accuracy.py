@@ -36,12 +36,9 @@ from wildlab.evaluation.ellipses import (
 )
 from wildlab.evaluation.errors import (
     ErrorSummary,
-    Scatter,
     bootstrap_interval,
-    scatter_by_image,
     summarise,
 )
-from wildlab.evaluation.intervals import Halves, compare_halves
 from wildlab.evaluation.outliers import largest_visible
 from wildlab.flight.calibration_files import (
     UNITS,
@@ -87,13 +84,8 @@ class Accuracy:
         The standard deviations that the ellipses come from.
     ellipses
         What they are worth.
-    halves
-        First half beside second.
     diagnosis
         The cause, where six images or more show a known point.
-    remaining
-        What the errors are made of once the cause is taken off, or as they are where no cause gained anything
-        for certain; without what is far out.
     visible_m
         Where each point is held against the nearest mark: larger errors go to another one; else NaN.
     """
@@ -106,9 +98,7 @@ class Accuracy:
     lost: int
     assumed: dict[str, float]
     ellipses: EllipseVerdict
-    halves: Halves
     diagnosis: Diagnosis | None
-    remaining: Scatter
     visible_m: float
 
     @property
@@ -161,13 +151,6 @@ def judge_accuracy(
         for name, figure in figures.items():
             low, high = bootstrap_interval(figure, errors, blocks, rng)
             intervals[name] = max(low, 0.0), high
-    left, of = errors, scored
-    if diagnosis is not None and diagnosis.counts:
-        left, of = diagnosis.winner.held, diagnosis.scored
-    elif diagnosis is not None:
-        left, of = errors_of(diagnosis.scored), diagnosis.scored
-    if diagnosis is not None:
-        left, of = left[diagnosis.inliers], of[diagnosis.inliers]
     by_nearest = flight.manifest.scoring.rule == "nearest"
     return Accuracy(
         observations=observations,
@@ -178,9 +161,7 @@ def judge_accuracy(
         lost=int((~np.isfinite(scored["error_m"])).sum()),
         assumed=used_deviations(observations, deviations),
         ellipses=judge_ellipses(errors, covariances_of(scored), blocks, rng),
-        halves=compare_halves(scored["error_m"].to_numpy(float), blocks),
         diagnosis=diagnosis,
-        remaining=scatter_by_image(left, of["frame_id"]),
         visible_m=visible_error(flight, scored) if by_nearest else np.nan,
     )
 

@@ -64,65 +64,6 @@ def summarise(errors: ArrayLike) -> ErrorSummary:
     )
 
 
-#: Errors beside another of their image from which the spread within images is estimated, at least: its
-#: standard deviation is then known to about a quarter.
-FEWEST_WITHIN = 10
-
-
-class Scatter(NamedTuple):
-    """Mean squared horizontal error split into what is constant, per image, and within images.
-
-    ``between_sd``, ``within_sd`` and ``bias``, the mean, are metres per axis (north, east).
-    """
-
-    between_sd: Array
-    within_sd: Array
-    bias: Array
-    whole_m: float
-
-    @property
-    def parts_m(self) -> tuple[float, float, float]:
-        """Root mean squares of the constant part, that of images and that within them: m, horizontal."""
-        bias, image, within = (float(np.hypot(*of)) for of in (self.bias, self.between_sd, self.within_sd))
-        return bias, image, within
-
-
-def scatter_by_image(errors: ArrayLike, image: ArrayLike) -> Scatter:
-    """Where errors come from: a constant, each image's own pose, or single clicks.
-
-    One-way analysis of variance with images as the groups, per axis.
-
-    Parameters
-    ----------
-    errors
-        (N, 2) north, east in n, m; rows with NaN are left out.
-    image
-        (N,) which image each belongs to: numbers or names.
-
-    Returns
-    -------
-    Scatter
-        All NaN where fewer than two images are left, or fewer than `FEWEST_WITHIN` errors beside another of
-        their image: how errors within an image differ is then anybody's guess.
-    """
-    e = np.asarray(errors, float).reshape(-1, 2)
-    keep = np.isfinite(e).all(axis=1)
-    e, group = e[keep], np.unique(np.asarray(image)[keep], return_inverse=True)[1]
-    count = np.bincount(group)
-    n, k = len(e), len(count)
-    if n - k < FEWEST_WITHIN or k < 2:
-        nan = np.full(2, np.nan)
-        return Scatter(nan, nan, nan, float("nan"))
-    mean = e.mean(axis=0)
-    of_image = np.stack([np.bincount(group, weights=e[:, axis]) / count for axis in (0, 1)], axis=-1)
-    within = ((e - of_image[group]) ** 2).sum(axis=0) / (n - k)
-    mean_square = (count[:, None] * (of_image - mean) ** 2).sum(axis=0) / (k - 1)
-    usual = (n - (count**2).sum() / n) / (k - 1)
-    between = np.maximum((mean_square - within) / usual, 0.0)
-    whole = float(np.sqrt((e**2).sum(axis=1).mean()))
-    return Scatter(np.sqrt(between), np.sqrt(within), mean, whole)
-
-
 def bootstrap_interval(
     statistic: Callable[[Array], float],
     errors: ArrayLike,

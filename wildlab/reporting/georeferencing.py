@@ -47,7 +47,6 @@ from wildlab.reporting.georeferencing_tables import (
     noise_table,
     outliers_table,
     parameters_table,
-    parts_table,
     simplest_rivals,
     worst_images,
     worst_sightings,
@@ -349,7 +348,6 @@ def limits(
         ("limit-extended", diagnosis is not None and diagnosis.extended, {}),
         ("limit-lost", 0 < found.lost <= MANY_LOST * len(found.scored), {"lost": found.lost}),
         ("limit-clock-fitted", manifest.kind != "twin" and abs(rest) > 1e-6, {"offset": f"{rest:+.2f}"}),
-        ("limit-halves", bool(found.halves.disagree), {}),
         ("limit-nearest", found.visible_m == found.visible_m, {"hidden": short_length(found.visible_m)}),
         ("limit-track", "track" in truth, {"sd": measure(truth.get("track", np.nan), "m")}),
         ("limit-wander", diagnosis is not None and diagnosis.counts, {}),
@@ -486,7 +484,6 @@ def show_accuracy(
     if groups and logged.n:
         wording.table("groups", groups_table(groups))
     show_models(report, wording, diagnosis)
-    wording.table("parts", parts_table(found))
     if diagnosis is not None:
         wording.table("noise", noise_table(diagnosis.noise, found.assumed))
     report.method(texts.method)

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pandas as pd
 
-from wildlab.analysis.accuracy import Accuracy, corrections
+from wildlab.analysis.accuracy import corrections
 from wildlab.analysis.diagnose import Diagnosis
 from wildlab.analysis.georeference import errors_of
 from wildlab.evaluation.correlated_errors import WanderNoise
@@ -144,17 +144,6 @@ def outliers_table(outliers: Sequence[Outlier]) -> pd.DataFrame:
             for one in outliers
         ]
     )
-
-
-def parts_table(found: Accuracy) -> pd.DataFrame:
-    """What the errors are made of once the cause is removed, RMS (m), largest first; none if unknown."""
-    scatter = found.remaining
-    if not np.isfinite(scatter.whole_m):
-        return pd.DataFrame(columns=["part", "rms"])
-    names = load_texts("georeferencing").quantities
-    parts = zip(("constant", "image", "point"), scatter.parts_m, strict=True)
-    rows = [{"part": names[name], "rms": float(rms)} for name, rms in sorted(parts, key=lambda one: -one[1])]
-    return pd.DataFrame([*rows, {"part": names["whole"], "rms": float(scatter.whole_m)}])
 
 
 def noise_table(noise: WanderNoise, assumed: Mapping[str, float]) -> pd.DataFrame:
