@@ -23,7 +23,7 @@ from wildlab.reporting.charts.flights import (
     strips,
 )
 from wildlab.reporting.charts.tracks import error_map, map_shown, speed_and_course
-from wildlab.reporting.georeferencing_tables import worst_images
+from wildlab.reporting.georeferencing import worst_images
 from wildlab.reporting.overview import way_of
 
 N = 200

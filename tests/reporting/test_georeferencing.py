@@ -9,8 +9,7 @@ import pandas as pd
 import pytest
 
 from wildlab.reporting import georeferencing
-from wildlab.reporting.georeferencing import truth_errors
-from wildlab.reporting.georeferencing_tables import worst_sightings
+from wildlab.reporting.georeferencing import truth_errors, worst_sightings
 
 
 def test_names_that_may_tell_of_a_place_are_numbered_unless_it_is_open():

@@ -24,7 +24,7 @@ from wildlab.evaluation.outliers import Outlier
 from wildlab.geometry.calibration import Calibration
 from wildlab.messages.catalogue import load_texts
 from wildlab.reporting import georeferencing as page
-from wildlab.reporting import georeferencing_tables as tables
+from wildlab.reporting import georeferencing as tables
 from wildlab.reporting.report import open_report
 
 MANY = summarise(np.tile([3.0, 4.0], (50, 1)))

@@ -271,8 +271,7 @@ def calibrate(flight: Path, out: Path, overwrite: bool, source: str | None, seed
     from wildlab.flight.calibration_files import write_calibration
     from wildlab.flight.checks.check import sense_sentences
     from wildlab.flight.store import load_flight
-    from wildlab.reporting.georeferencing import words_of_causes
-    from wildlab.reporting.georeferencing_tables import simplest_rivals
+    from wildlab.reporting.georeferencing import simplest_rivals, words_of_causes
 
     refuse_existing(out, overwrite)
     loaded = load_flight(flight)
