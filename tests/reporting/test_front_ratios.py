@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from wildlab.evaluation.replication import Closeness, Comparison, Compatibility
 from wildlab.reporting import published_tables as ratios
 from wildlab.reporting.front_page import MOST_PIXELS, read_glimpse, smaller
-from wildlab.reporting.status import FIRST_LOOK, MISSING, Number
+from wildlab.reporting.published import FIRST_LOOK, MISSING, Number
 
 CLOSE, NOT_CLOSE = Closeness.CLOSE, Closeness.NOT_CLOSE
 WITHIN, OUTSIDE = Compatibility.WITHIN, Compatibility.OUTSIDE

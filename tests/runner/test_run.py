@@ -228,7 +228,7 @@ def test_a_run_that_is_broken_off_keeps_the_former_report(tmp_path, number):
 KILLED = """
 import multiprocessing, shutil, subprocess, sys, time
 from pathlib import Path
-from wildlab.runner import notebook_process
+from wildlab.runner import job as notebook_process
 from wildlab.runner.processes import start_process
 from wildlab.runner.job import Job
 

@@ -23,7 +23,7 @@ from wildlab.reporting.text import page
 from wildlab.runner.evaluate import MANY_NOTEBOOK as NOTEBOOK
 from wildlab.runner.status import seal
 from wildlab.sharing.allow_list import Chapter, join_chapters, read_part
-from wildlab.sharing.reports import sources_of
+from wildlab.sharing.recomputation import sources_of
 from wildlab.sharing.share import (
     check_password,
     private_folder,

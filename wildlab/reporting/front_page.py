@@ -27,6 +27,7 @@ from wildlab.evaluation.shares import HOLDS, MOSTLY, SHARE_VERDICTS, expected_wr
 from wildlab.messages.catalogue import fill, load_texts
 from wildlab.paths import DATA
 from wildlab.reporting import published_tables as published
+from wildlab.reporting.published import FIRST_LOOK, Case, Number, StudyStatus
 from wildlab.reporting.published_tables import (
     LONGEST,
     PREDICTED,
@@ -38,7 +39,6 @@ from wildlab.reporting.published_tables import (
     summed_up,
     tested_on,
 )
-from wildlab.reporting.status import FIRST_LOOK, Case, Number, StudyStatus
 from wildlab.reporting.text import PILLS, TAGS, page, prose, read_style, render, table_html
 
 #: The page, beside the ledger.

@@ -22,20 +22,18 @@ from wildlab.messages.quantities import NOTHING, number, unit_words
 from wildlab.names import listed
 from wildlab.reporting.published import (
     CALCULATED,
+    FIRST_LOOK,
     MANY,
     MEAN_OF_RUNS,
+    MISSING,
     ONE_FLIGHT,
     SHARE_OF_IMAGES,
-    quantity_kind,
-    spread_key,
-)
-from wildlab.reporting.status import (
-    FIRST_LOOK,
-    MISSING,
     Claim,
     Number,
     Standing,
     StudyStatus,
+    quantity_kind,
+    spread_key,
     standing,
 )
 from wildlab.reporting.text import dim, mark_up, pill, render, table

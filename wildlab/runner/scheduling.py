@@ -23,8 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from wildlab.errors import RunFailed, WildlabError
-from wildlab.runner.job import Failure, Job, clear, install, leave_failure, log_of, sweep
-from wildlab.runner.notebook_process import run_notebook
+from wildlab.runner.job import Failure, Job, clear, install, leave_failure, log_of, run_notebook, sweep
 from wildlab.runner.processes import Child
 from wildlab.runner.seeds import (
     SeedWork,
