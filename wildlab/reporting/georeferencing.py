@@ -42,7 +42,6 @@ from wildlab.reporting.charts.drawing import sightings_chart
 from wildlab.reporting.charts.tracks import error_map, error_scatter, error_shares, errors_by_image
 from wildlab.reporting.figures import colour
 from wildlab.reporting.notebook_pages import ADVICE
-from wildlab.reporting.published import load_published
 from wildlab.reporting.report import Report, Wording
 
 #: Fewer points than this say little about a flight.
@@ -114,17 +113,6 @@ def worst_sightings(flight: Flight, scored: pd.DataFrame) -> pd.DataFrame:
     found = worst.join(furthest.loc[worst["image"]].join(pixels, on="detection_id"), on="image")
     lines = [f"{n}: {length(m)}" for n, m in zip(found["number"], found["error_m"], strict=True)]
     return found.assign(line=lines)
-
-
-def beside_published(published: pd.DataFrame, theirs: ErrorSummary, ours: ErrorSummary) -> pd.DataFrame:
-    """Published figures with those of the same answers scored here (``again``) and of ours (``here``)."""
-    table = published[published["name"].isin(SUMMARY)]
-    fields = [SUMMARY[name] for name in table["name"]]
-    return table.assign(
-        quantity=[name.removeprefix("horizontal_error_") for name in table["name"]],
-        again=[getattr(theirs, field) for field in fields],
-        here=[getattr(ours, field) for field in fields],
-    )
 
 
 def simplest_rivals(diagnosis: Diagnosis) -> list[int]:
@@ -340,8 +328,8 @@ def cause_message(diagnosis: Diagnosis | None) -> Message:
     values = {
         "causes": words_of_causes(causes),
         "share": percent_of(share),
-        "without": short_length(winner.gain.without),
-        "with": short_length(winner.gain.with_),
+        "without": length(winner.gain.without),
+        "with": length(winner.gain.with_),
     }
     if not diagnosis.counts:
         simplest = [diagnosis.models[m].causes for m in simplest_rivals(diagnosis)]
@@ -362,8 +350,8 @@ def answer(found: Accuracy) -> list[Message]:
         "points": summary.n,
         "total": total,
         "lost": found.lost,
-        "median": short_length(summary.median),
-        "p90": short_length(summary.p90),
+        "median": length(summary.median),
+        "p90": length(summary.p90),
     }
     if not summary.n:
         return [Message("no-position", values)]
@@ -454,7 +442,7 @@ def advice(found: Accuracy, *, calibrated_elsewhere: bool, problems: int = 0) ->
     # What is far out may come of what contradicts itself, or of a constant error that is not certain.
     if first is not None and not problems and not possible_share(found.summary, diagnosis):
         name = first.mark if first.kind == "mark" else first.photo
-        values = {"kind": first.kind, "name": str(name), "error": short_length(first.off_m)}
+        values = {"kind": first.kind, "name": str(name), "error": length(first.off_m)}
         said.append(Message("advice-outlier", values))
     return said[:MOST_ADVICE]
 
@@ -483,7 +471,7 @@ def limits(
         ("limit-extended", diagnosis is not None and diagnosis.extended, {}),
         ("limit-lost", 0 < found.lost <= MANY_LOST * len(found.scored), {"lost": found.lost}),
         ("limit-clock-fitted", manifest.kind != "twin" and abs(rest) > 1e-6, {"offset": f"{rest:+.2f}"}),
-        ("limit-nearest", found.visible_m == found.visible_m, {"hidden": short_length(found.visible_m)}),
+        ("limit-nearest", found.visible_m == found.visible_m, {"hidden": length(found.visible_m)}),
         ("limit-track", "track" in truth, {"sd": measure(truth.get("track", np.nan), "m")}),
         ("limit-wander", diagnosis is not None and diagnosis.counts, {}),
         ("limit-unlabelled", bool(programs), {}),
@@ -497,11 +485,6 @@ def limits(
 
 
 # -- the page
-
-
-def short_length(metres: float) -> str:
-    """A length with its unit, in centimetres below a metre: ``5.1 m``, ``40 cm``."""
-    return measure(metres, "m") if not metres < 0.95 else measure(100 * metres, "cm")
 
 
 def span(values: Any) -> str:
@@ -601,10 +584,7 @@ def show_accuracy(
         rows |= _other_summaries(found, texts)
         rows |= {texts.subjects["recorded"].format(program): one for program, one in others.items()}
         wording.table("errors", errors_table(rows))
-        published = load_published(report.study)
-        if len(published) and others:
-            beside = beside_published(published, next(iter(others.values())), logged)
-            wording.table("published", beside)
+        report.published(texts.subjects["published"], texts.subjects, {})
     if diagnosis is not None:
         if corrections is not None and (diagnosis.counts or possible_share(logged, diagnosis)):
             wording.table("parameters" if diagnosis.counts else "parameters-possible", corrections)
@@ -654,13 +634,13 @@ def _subtitle(flight: Flight, found: Accuracy) -> str:
 def _tiles(found: Accuracy, texts: PageTexts) -> list[tuple[str, str]]:
     logged, diagnosis, names = found.summary, found.diagnosis, texts.subjects
     interval = found.intervals.get("horizontal_error_mean")
-    again = f" ({short_length(interval[0])} to {short_length(interval[1])})" if interval else ""
+    again = f" ({length(interval[0])} to {length(interval[1])})" if interval else ""
     shown = [
-        (short_length(logged.mean), names["tile-mean"] + again),
-        (short_length(logged.p90), names["tile-p90"]),
+        (length(logged.mean), names["tile-mean"] + again),
+        (length(logged.p90), names["tile-p90"]),
     ]
     if diagnosis is not None and diagnosis.counts:
-        shown.append((short_length(diagnosis.held_summary().mean), names["tile-corrected"]))
+        shown.append((length(diagnosis.held_summary().mean), names["tile-corrected"]))
     coverage = found.ellipses.coverage
     if np.isfinite(coverage.estimate):
         ends = (
@@ -725,7 +705,7 @@ def answer_repeats(found: Repeats) -> Message:
     if spread is None:
         return Message("none-twice", values)
     values |= {
-        "scatter": short_length(spread.sd),
+        "scatter": length(spread.sd),
         "sightings": spread.sightings,
         "things": spread.things,
         "ratio": significant(spread.consistent),
@@ -778,7 +758,7 @@ def show_repeats(report: Report, flight: Flight, found: Repeats, amiss: Sequence
         report.metric("sighting_consistency", "logged-pose", spread.consistent, "1", n=spread.sightings)
         report.tiles(
             [
-                (short_length(spread.sd), texts.subjects["tile-scatter"]),
+                (length(spread.sd), texts.subjects["tile-scatter"]),
                 (f"{spread.things} of {len(found.things)}", texts.subjects["tile-things"]),
                 (f"{found.lost} of {total}", texts.subjects["tile-lost"]),
             ]
