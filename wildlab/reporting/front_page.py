@@ -500,7 +500,7 @@ def ledger_page(studies: Iterable[StudyStatus], *, code: str = "", cases: Sequen
     body = render(
         "ledger",
         tiles=_tiles(studies),
-        studies=[(one, _tag(one), _in_short(one)) for one in studies],
+        studies=[(one, study_tag(one), _in_short(one)) for one in studies],
         summed_up=summed_up,
         numbers_table=partial(published_table, ledger=True),
         claims_table=_claims,
@@ -573,16 +573,6 @@ def _tiles(studies: Sequence[StudyStatus]) -> list[tuple[str, str]]:
 def _waiting(count: int) -> str:
     """How many have no verdict: their study has not been run, or not in full, or says why it gives none."""
     return f"; {count} without a verdict" if count else ""
-
-
-def _tag(one: StudyStatus) -> str:
-    study = one.study
-    if study.kind == "twin":
-        flights = f", {one.seeds} flights" if one.seeds and one.seeds > 1 else ""
-        return f"twin: {study.twin}{flights}"
-    if study.kind == "logged":
-        return f"logged: {one.flight or study.dataset or study.recipe}"
-    return TAGS["computed"]
 
 
 def _rule() -> Markup:
