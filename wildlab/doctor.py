@@ -10,30 +10,26 @@ import os
 import shutil
 import sys
 import tomllib
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
 from importlib import metadata
 from pathlib import Path
+from typing import NamedTuple
 
-from packaging.requirements import InvalidRequirement, Requirement
+from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 from wildlab import paths
 
 #: A full set of reports is some tens of megabytes; less than this and a run may stop half way.
 ENOUGH_DISK_BYTES = 500_000_000
-OLDEST_PYTHON = (3, 11)
-BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+#: What wildlab reads.
+RESOURCES = ("notebooks/studies.toml", "data/catalog.toml", "data/twins", "data/recipes", "data/published")
 #: How many package names a sentence lists before it says "and 12 more".
 LISTED = 4
 
 
-@dataclass(frozen=True)
-class Finding:
-    """One thing looked at: whether it is well, its name, what was found, and what to do ("" for nothing).
-
-    A finding that is ``ok`` and still carries a fix is a note: something optional is absent.
-    """
+class Finding(NamedTuple):
+    """One thing looked at: whether it is well, its name, what was found, and what to do ("" for nothing)."""
 
     ok: bool
     name: str
@@ -42,7 +38,7 @@ class Finding:
 
 
 def examine(root: Path | None = paths.ROOT) -> list[Finding]:
-    """Look at the Python, its packages, the Jupyter kernel, the disk and the tools around them.
+    """Look at the Python, its packages, the Jupyter kernel, what wildlab reads, and the place of reports.
 
     Parameters
     ----------
@@ -56,32 +52,16 @@ def examine(root: Path | None = paths.ROOT) -> list[Finding]:
         In the order in which they should be mended.
     """
     if root is None:
-        wishes = metadata.requires("wildlab") or []
-        packages = [check_requirements(wishes), check_tested_versions(paths.LOCK)]
+        packages = [check_packages(map(Requirement, metadata.requires("wildlab") or []))]
     else:
-        lock = root / "environment.lock"
-        packages = [check_packages(lock), check_lock(lock, root / "pyproject.toml")]
+        packages = check_checkout(root)
     return [
-        check_python(),
         check_environment(root),
         *packages,
         check_resources(root or paths.RESOURCES),
         check_kernel(),
         check_reports_folder(root / "reports" if root else paths.REPORTS.absolute()),
-        check_disk(root or Path.cwd()),
-        *([check_git(root)] if root else []),
-        check_mirror(),
-        *([check_browser()] if root else []),
     ]
-
-
-def check_python(version: tuple[int, ...] = sys.version_info[:3]) -> Finding:
-    """Is this Python new enough?"""
-    found = ".".join(str(part) for part in version)
-    if version[:2] < OLDEST_PYTHON:
-        fix = "Install wildlab with a newer one (in a checkout: 'make PYTHON=python3.12 environment')."
-        return Finding(False, "Python", found, fix)
-    return Finding(True, "Python", found)
 
 
 def check_environment(root: Path | None, prefix: str = sys.prefix) -> Finding:
@@ -94,9 +74,32 @@ def check_environment(root: Path | None, prefix: str = sys.prefix) -> Finding:
     slipped = [variable for variable in ("PYTHONPATH", "PYTHONHOME") if os.environ.get(variable)]
     if slipped:
         found = f"{slipped[0]} is set and may bring in foreign packages"
-        fix = f"Unset it: 'unset {slipped[0]}'."
-        return Finding(False, name, found, fix)
-    return Finding(True, name, str(wanted))
+        return Finding(False, name, found, f"Unset it: 'unset {slipped[0]}'.")
+    return Finding(True, name, f"{wanted}, Python {sys.version.split()[0]}")
+
+
+def check_checkout(root: Path, installed: Mapping[str, str] | None = None) -> list[Finding]:
+    """Are the packages here those of the lock, and does that hold what ``pyproject.toml`` asks for?
+
+    Compared by what they say: the files' dates mean nothing after a clone.
+    """
+    lock, project = root / "environment.lock", root / "pyproject.toml"
+    try:
+        pins = read_lock(lock)
+        about = tomllib.loads(project.read_text(encoding="utf-8"))["project"]
+        several = [about.get("dependencies", []), *about.get("optional-dependencies", {}).values()]
+        wishes = [Requirement(text) for texts in several for text in texts]
+    except (OSError, ValueError, KeyError) as error:
+        fix = f"Restore them: 'git checkout {lock.name} {project.name}'."
+        return [Finding(False, "lock", f"{lock.name} or {project.name} cannot be read: {error}", fix)]
+    fix = "Run 'make environment'; if that finds nothing to do, 'make clean environment'."
+    locked: dict[str, str] = {canonicalize_name(pin.name): next(iter(pin.specifier)).version for pin in pins}
+    behind = _unmet(wishes, locked)
+    found = f"older than pyproject.toml, which asks for {_few(behind)}" if behind else "up to date"
+    return [
+        check_packages(pins, installed, fix),
+        Finding(not behind, "lock", found, "Run 'make lock'." if behind else ""),
+    ]
 
 
 def read_lock(lock: Path) -> list[Requirement]:
@@ -107,23 +110,36 @@ def read_lock(lock: Path) -> list[Requirement]:
     OSError, ValueError
         The file cannot be read, or a line of it is no requirement.
     """
-    pins = []
-    for line in lock.read_text(encoding="utf-8").splitlines():
-        text = line.removesuffix("\\").strip()
-        if not text or text.startswith(("#", "--")):
+    lines = (line.removesuffix("\\").strip() for line in lock.read_text(encoding="utf-8").splitlines())
+    pins = [Requirement(line) for line in lines if line and not line.startswith(("#", "--"))]
+    return [pin for pin in pins if pin.marker is None or pin.marker.evaluate()]
+
+
+def check_packages(
+    wishes: Iterable[Requirement], installed: Mapping[str, str] | None = None, fix: str = ""
+) -> Finding:
+    """Is everything here that is wanted, in versions that are?"""
+    if installed is None:
+        named = ((item.metadata["Name"], item.version) for item in metadata.distributions())
+        installed = {canonicalize_name(name): version for name, version in named if name}
+    if unmet := _unmet(wishes, installed):
+        asked = " ".join(f"'{one.partition(' ')[0]}'" for one in unmet)
+        fix = fix or f"Run 'python -m pip install' with {asked}."
+        return Finding(False, "packages", f"wanted: {_few(unmet)}", fix)
+    return Finding(True, "packages", "all that are wanted")
+
+
+def _unmet(wishes: Iterable[Requirement], versions: Mapping[str, str]) -> list[str]:
+    """The requirements that ``versions`` (by canonical name) does not meet, extras left out."""
+    unmet = []
+    for wish in wishes:
+        if wish.marker is not None and not wish.marker.evaluate({"extra": ""}):
             continue
-        try:
-            pin = Requirement(text)
-        except InvalidRequirement as error:
-            raise ValueError(f"{text[:60]!r} is not a requirement") from error
-        if pin.marker is None or pin.marker.evaluate():
-            pins.append(pin)
-    return pins
-
-
-def _installed() -> dict[str, str]:
-    names = ((item.metadata["Name"], item.version) for item in metadata.distributions())
-    return {canonicalize_name(name): version for name, version in names if name}
+        version = versions.get(canonicalize_name(wish.name))
+        if version is None or not wish.specifier.contains(version, prereleases=True):
+            here = f" ({version} is here)" if version else ""
+            unmet.append(f"{wish.name}{wish.specifier}{here}")
+    return unmet
 
 
 def _few(names: list[str]) -> str:
@@ -131,106 +147,10 @@ def _few(names: list[str]) -> str:
     return ", ".join(names[:LISTED]) + (f" and {more} more" if more > 0 else "")
 
 
-def check_packages(lock: Path, installed: Mapping[str, str] | None = None) -> Finding:
-    """Are the packages installed here those of the lock, markers considered?"""
-    name = "packages"
-    fix = "Run 'make environment'; if that finds nothing to do, 'make clean environment'."
-    try:
-        pins = read_lock(lock)
-    except (OSError, ValueError) as error:
-        restore = "Restore it: 'git checkout environment.lock'."
-        return Finding(False, name, f"{lock} cannot be read: {error}", restore)
-    here = _installed() if installed is None else installed
-    missing = [pin.name for pin in pins if canonicalize_name(pin.name) not in here]
-    different = _different(pins, here)
-    wrong = []
-    if missing:
-        wrong.append(f"missing: {_few(missing)}")
-    if different:
-        wrong.append(f"different from environment.lock: {_few(different)}")
-    if wrong:
-        return Finding(False, name, "; ".join(wrong), fix)
-    return Finding(True, name, f"{len(pins)}, as environment.lock says")
-
-
-def _different(pins: Iterable[Requirement], versions: Mapping[str, str]) -> list[str]:
-    """What is there in another version than its pin's, in words."""
-    found = [(pin, versions.get(canonicalize_name(pin.name))) for pin in pins]
-    return [
-        f"{pin.name} {version} instead of {str(pin.specifier).removeprefix('==')}"
-        for pin, version in found
-        if version is not None and not pin.specifier.contains(version, prereleases=True)
-    ]
-
-
-def check_requirements(wishes: Iterable[str], installed: Mapping[str, str] | None = None) -> Finding:
-    """Is everything here that an installed wildlab asks for, in versions that it can use?"""
-    name = "packages"
-    unmet = _unmet(wishes, _installed() if installed is None else installed)
-    if unmet:
-        packages = " ".join(f"'{wish}'" for wish in unmet)
-        fix = f"Run 'python -m pip install' with {packages}."
-        return Finding(False, name, f"wildlab asks for {_few(unmet)}", fix)
-    return Finding(True, name, "all that wildlab asks for")
-
-
-def check_tested_versions(lock: Path, installed: Mapping[str, str] | None = None) -> Finding:
-    """Are the packages those that the numbers were tested with? Others may do, so this is a note."""
-    name = "tested versions"
-    try:
-        pins = read_lock(lock)
-    except (OSError, ValueError) as error:
-        return Finding(False, name, f"{lock} cannot be read: {error}", "Install the wheel again.")
-    different = _different(pins, _installed() if installed is None else installed)
-    if different:
-        found = f"different from environment.lock: {_few(different)}"
-        fix = f"Last digits may differ; 'python -m pip install -r {lock}' takes what was tested."
-        return Finding(True, name, found, fix)
-    return Finding(True, name, "as environment.lock says")
-
-
-def _unmet(wishes: Iterable[str], versions: Mapping[str, str]) -> list[str]:
-    """The requirements that ``versions`` (by canonical name) does not meet, extras left out."""
-    unmet = []
-    for wish in map(Requirement, wishes):
-        if wish.marker is not None and not wish.marker.evaluate({"extra": ""}):
-            continue
-        version = versions.get(canonicalize_name(wish.name))
-        if version is None or not wish.specifier.contains(version, prereleases=True):
-            unmet.append(f"{wish.name}{wish.specifier}")
-    return unmet
-
-
-def check_lock(lock: Path, pyproject: Path) -> Finding:
-    """Does the lock hold everything that ``pyproject.toml`` asks for?
-
-    Compared by what they say: the files' dates mean nothing after a clone.
-    """
-    name = "lock"
-    try:
-        pins = {
-            canonicalize_name(pin.name): next((item.version for item in pin.specifier), "")
-            for pin in read_lock(lock)
-        }
-        project = tomllib.loads(pyproject.read_text(encoding="utf-8"))["project"]
-        texts = [*project.get("dependencies", [])]
-        for extra in project.get("optional-dependencies", {}).values():
-            texts += extra
-        behind = _unmet(texts, {name: version for name, version in pins.items() if version})
-    except (OSError, ValueError, KeyError) as error:
-        return Finding(False, name, f"cannot be compared with {pyproject}: {error}", "Restore both from git.")
-    if behind:
-        found = f"older than pyproject.toml, which asks for {_few(behind)}"
-        return Finding(False, name, found, "Run 'make lock'.")
-    return Finding(True, name, "environment.lock answers pyproject.toml")
-
-
 def check_resources(folder: Path) -> Finding:
     """Is there what wildlab reads: studies, twins, recipes, published numbers?"""
     name = "notebooks and data"
-    needed = ("notebooks/studies.toml", "data/catalog.toml", "data/twins", "data/recipes", "data/published")
-    missing = [entry for entry in needed if not (folder / entry).exists()]
-    if missing:
+    if missing := [entry for entry in RESOURCES if not (folder / entry).exists()]:
         fix = "Install wildlab again (in a checkout: 'git checkout notebooks data')."
         return Finding(False, name, f"{_few(missing)} not in {folder}", fix)
     return Finding(True, name, f"in {folder}")
@@ -238,77 +158,29 @@ def check_resources(folder: Path) -> Finding:
 
 def check_kernel() -> Finding:
     """Would a notebook's kernel ``python3`` be this very Python?"""
-    name = "kernel"
     from jupyter_client.kernelspec import KernelSpecManager, NoSuchKernel
 
     try:
-        spec = KernelSpecManager().get_kernel_spec("python3")
+        program = (*KernelSpecManager().get_kernel_spec("python3").argv, "")[0]
     except NoSuchKernel:
         fix = f"Run '{sys.executable} -m ipykernel install --sys-prefix'."
-        return Finding(False, name, "Jupyter finds no kernel named python3", fix)
-    program = spec.argv[0] if spec.argv else ""
-    # Jupyter itself replaces a bare "python" by the interpreter it runs in.
-    if program.startswith("python") and "/" not in program and "\\" not in program:
-        return Finding(True, name, f"python3 is this Python ({sys.executable})")
-    # Not resolved: the interpreter in .venv/bin is a link to the one that it was made from.
-    if Path(program).absolute() == Path(sys.executable).absolute():
-        return Finding(True, name, f"python3 is {program}")
+        return Finding(False, "kernel", "Jupyter finds no kernel named python3", fix)
+    # Jupyter itself replaces a bare "python" by the interpreter it runs in. Not resolved: the interpreter in
+    # .venv/bin is a link to the one that it was made from.
+    bare = program.startswith("python") and Path(program).name == program
+    if bare or Path(program).absolute() == Path(sys.executable).absolute():
+        return Finding(True, "kernel", f"python3 is {program}")
     fix = "Set JUPYTER_PREFER_ENV_PATH=1, or run 'jupyter kernelspec remove python3'."
-    return Finding(False, name, f"python3 in {spec.resource_dir} starts {program}, not {sys.executable}", fix)
+    return Finding(False, "kernel", f"python3 is {program}, not {sys.executable}", fix)
 
 
-def check_reports_folder(reports: Path) -> Finding:
-    """Can a run write its report?"""
-    name = "reports folder"
+def check_reports_folder(reports: Path, free: int | None = None) -> Finding:
+    """Can a run write its report, and is there room for all of them?"""
     where = reports if reports.exists() else reports.parent
-    if not where.is_dir():
-        return Finding(False, name, f"{where} is not a folder", "Move it away, or give another with --out.")
-    if not os.access(where, os.W_OK | os.X_OK):
-        fix = "Change its rights, or give another with --out."
-        return Finding(False, name, f"{where} cannot be written to", fix)
-    return Finding(True, name, f"{reports} can be written to")
-
-
-def check_disk(root: Path, free: int | None = None) -> Finding:
-    """Is there room for a set of reports?"""
-    name = "disk"
-    free = shutil.disk_usage(root).free if free is None else free
-    found = f"{free / 1e9:.1f} GB free"
-    if free < ENOUGH_DISK_BYTES:
-        return Finding(False, name, found, f"Free at least {ENOUGH_DISK_BYTES / 1e9:.1f} GB before a run.")
-    return Finding(True, name, found)
-
-
-def check_git(root: Path) -> Finding:
-    """Can provenance name the commit? Reports are made without it too, but then say less."""
-    name = "git"
-    program = shutil.which("git")
-    if program is None:
-        found = "not found: reports cannot name the commit they were made with"
-        return Finding(True, name, found, "Install git.")
-    if not (root / ".git").exists():
-        found = "not a git checkout: reports cannot name the commit they were made with"
-        return Finding(True, name, found, "Use 'git clone' instead of an unpacked archive.")
-    return Finding(True, name, program)
-
-
-def check_mirror(environ: Mapping[str, str] = os.environ) -> Finding:
-    """Where data sets would come from."""
-    name = "data sets"
-    mirror = environ.get("WILDLAB_DATA_MIRROR", "")
-    if not mirror:
-        return Finding(True, name, "fetched from where they are published (WILDLAB_DATA_MIRROR is not set)")
-    if not Path(mirror).is_dir():
-        fix = "Set it to a folder that exists, or unset it to fetch from the network."
-        return Finding(False, name, f"WILDLAB_DATA_MIRROR is {mirror}, which is not a folder", fix)
-    return Finding(True, name, f"taken from {mirror} (WILDLAB_DATA_MIRROR)")
-
-
-def check_browser(which: Callable[[str], str | None] = shutil.which) -> Finding:
-    """Is there a Chromium for the test that opens every report? Nothing else needs one."""
-    name = "browser for tests"
-    program = next((found for found in map(which, BROWSERS) if found), None)
-    if program is None:
-        fix = "To run them, install Chromium (Debian and Ubuntu: 'apt-get install chromium')."
-        return Finding(True, name, "no Chromium found: the tests that open reports are skipped", fix)
-    return Finding(True, name, program)
+    if not where.is_dir() or not os.access(where, os.W_OK | os.X_OK):
+        fix = "Change its rights or move it away, or give another with --out."
+        return Finding(False, "reports folder", f"{where} is no folder that can be written to", fix)
+    free = shutil.disk_usage(where).free if free is None else free
+    found = f"{reports}, {free / 1e9:.1f} GB free"
+    fix = "" if free >= ENOUGH_DISK_BYTES else f"Free {ENOUGH_DISK_BYTES / 1e9:.1f} GB before a run."
+    return Finding(not fix, "reports folder", found, fix)

@@ -1,10 +1,9 @@
-"""Axes, ellipses and sightings: verdicts follow from numbers that are known."""
+"""Ellipses and sightings: verdicts follow from numbers that are known."""
 
 import numpy as np
 import pytest
 
 from wildlab.evaluation.ellipses import judge_ellipses, spread_of_sightings
-from wildlab.evaluation.errors import split_along
 from wildlab.evaluation.intervals import time_blocks
 from wildlab.evaluation.outliers import largest_visible
 
@@ -13,60 +12,6 @@ BLOCKS = np.arange(240) // 12
 
 def normal(seed, sd=2.0, n=240):
     return np.random.default_rng(seed).normal(0, sd, (n, 2))
-
-
-def test_a_constant_error_is_found_along_its_axis_and_no_other():
-    """Three metres beyond the mark, seen from all sides: nothing in north and east."""
-    turn = np.linspace(0, 2 * np.pi, 240, endpoint=False)
-    away = np.column_stack([np.cos(turn), np.sin(turn)])
-    right = np.column_stack([-away[:, 1], away[:, 0]])
-    axes = {"north": [1.0, 0.0], "east": [0.0, 1.0], "away": away, "right": right}
-    # Blocks that hold all sides: seen from one side at a time, away is a direction of the world.
-    found = split_along(3.0 * away + normal(0, 0.5), axes, np.arange(240) % 12)
-    assert [name for name, one in found.items() if one.constant] == ["away"]
-    assert found["away"].mean.estimate == pytest.approx(3.0, abs=0.1)
-    assert found["away"].share > 0.9 > 0.1 > found["north"].share
-
-
-def test_of_sound_flights_one_in_ten_has_an_axis_told_from_zero():
-    """Blocks of ten points that err alike: all intervals of a flight hold at once."""
-    turn = np.linspace(0, 2 * np.pi, 240)
-    away = np.column_stack([np.cos(turn), np.sin(turn)])
-    axes = {"north": [1.0, 0.0], "east": [0.0, 1.0], "away": away, "right": away[:, ::-1] * [-1, 1]}
-    wrong = 0
-    for seed in range(200):
-        errors = np.repeat(normal(seed, n=24), 10, axis=0)
-        wrong += any(one.told for one in split_along(errors, axes, np.arange(240) // 10).values())
-    assert 4 <= wrong <= 20 + 3 * np.sqrt(200 * 0.1 * 0.9)
-
-
-def test_where_errors_outlast_the_flight_there_is_no_interval():
-    """A minute of an error that drifts by: wider than all errors lie apart, an interval says nothing."""
-    times = np.arange(0.0, 60.0, 0.25)
-    drift = np.outer(np.sin(times / 20), [2.0, 1.0])
-    blocks = time_blocks(times, seconds=True)
-    axes = {"north": [1.0, 0.0], "east": [0.0, 1.0]}
-    for errors, known in ((drift + normal(1, 0.1), False), (normal(1), True)):
-        for one in split_along(errors, axes, blocks).values():
-            assert np.isfinite(one.mean).tolist() == [True, known, known] and not one.constant
-
-
-def test_a_constant_that_is_certain_and_small_is_negligible():
-    found = split_along(
-        normal(2, n=2400) + np.array([0.3, 0.0]), {"north": [1.0, 0.0]}, np.arange(2400) // 10
-    )["north"]
-    assert found.told and found.share < 0.05 and not found.constant
-
-
-def test_the_share_is_of_all_points_where_only_some_have_the_axis():
-    """What taking the constant off where it is takes off the squared error."""
-    errors, axis = normal(3), np.tile([1.0, 0.0], (240, 1))
-    errors[:24, 0] += 3.0
-    axis[24:] = np.nan
-    one = split_along(errors, {"some": axis}, BLOCKS)["some"]
-    without = errors.copy()
-    without[:24, 0] -= one.mean.estimate
-    assert one.share == pytest.approx(1 - (without**2).sum() / (errors**2).sum(), rel=1e-6)
 
 
 @pytest.mark.parametrize(

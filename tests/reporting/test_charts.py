@@ -16,14 +16,14 @@ from wildlab.analysis.overview import Path
 from wildlab.analysis.tracks.single_target import SensorTrack
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.geometry.frames import Array
+from wildlab.reporting.charts.drawing import Curve, squares_chart
 from wildlab.reporting.charts.flights import (
     Clock,
     error_bands,
-    lines_chart,
-    squares_chart,
+    strips,
 )
 from wildlab.reporting.charts.tracks import error_map, map_shown, speed_and_course
-from wildlab.reporting.georeferencing_tables import worst_images
+from wildlab.reporting.georeferencing import worst_images
 from wildlab.reporting.overview import way_of
 
 N = 200
@@ -75,7 +75,7 @@ def test_errors_and_twice_their_deviations_are_drawn():
 
 def test_squares_have_the_band_of_chi_square():
     values = np.random.default_rng(1).chisquare(3, 301)
-    fig = squares_chart({"position": (TIMES, values)}, 3, "NIS")
+    fig = squares_chart({"NIS": [Curve(TIMES, values, "black", dots=True)]}, 3)
     edges = [line.get_ydata()[0] for line in fig.axes[0].lines if len(line.get_ydata()) == 2]
     assert sorted(edges) == pytest.approx(chi_square_interval(3))
 
@@ -99,7 +99,9 @@ def test_a_steady_course_is_drawn_about_itself_also_over_north():
     about = courses(figure)["truth"]
     assert np.ptp(about) == pytest.approx(2 * np.degrees(np.arctan(0.05)), rel=0.01)
     low, high = figure.axes[1].get_ylim()
-    assert low < about.min() and about.max() < high and high - low == pytest.approx(20.0)
+    assert (
+        low < about.min() and about.max() < high and high - low == pytest.approx(20 + np.ptp(about), rel=0.01)
+    )
     assert figure.axes[1].yaxis.get_major_formatter()(-5.0, 0) == "355"
     assert figure.axes[0].get_ylim()[1] == pytest.approx(1.2, rel=0.01)
 
@@ -111,9 +113,9 @@ def test_courses_all_round_break_over_north():
     angle = courses(figure)["truth"]
     seen = angle[np.isfinite(angle)]
     assert len(seen) < len(angle)
-    assert (seen >= 0).all() and (seen <= 360).all()
     assert np.nanmax(np.abs(np.diff(angle))) < 180
-    assert figure.axes[1].get_ylim() == (-5.0, 365.0)
+    low, high = figure.axes[1].get_ylim()
+    assert high - low > 360
 
 
 SOURCES = ("autopilot", "truth", "mine", "truth-payload", "mekf")
@@ -121,9 +123,10 @@ SOURCES = ("autopilot", "truth", "mine", "truth-payload", "mekf")
 
 def test_every_source_and_the_ground_have_a_look_of_their_own():
     times = np.arange(3.0)
-    series = {name: (times, times + index) for index, name in enumerate(SOURCES)}
-    figure = lines_chart(series, Clock(0.0, 10.0), "height (m)", ground=(times, times))
+    series = {name: (times, times + index) for index, name in enumerate(("ground", *SOURCES))}
+    figure = strips({"height (m)": series}, Clock(0.0, 10.0))
     looks = {line.get_label(): (line.get_color(), line.get_linestyle()) for line in figure.axes[0].lines}
+    looks["mekf"] = looks.pop("filter (MEKF)")
     assert set(looks) == {"ground", *SOURCES} and len(set(looks.values())) == len(looks)
     black = {name for name, (color, _) in looks.items() if color == "#000000"}
     assert black == {"truth", "truth-payload"}

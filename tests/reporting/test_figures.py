@@ -59,9 +59,9 @@ def walk(rng: np.random.Generator, *shape: int) -> np.ndarray:
 
 
 def strips_of(rng: np.random.Generator) -> Figure:
-    one = {"roll (°)": walk(rng, 181), "pitch (°)": walk(rng, 181)}
-    sources = dict.fromkeys(("mekf", "truth", "autopilot", "observer"), (TIMES, one))
-    return flights.strips(sources)
+    sources = ("mekf", "truth", "autopilot", "observer")
+    angles = {label: dict.fromkeys(sources, (TIMES, walk(rng, 181))) for label in ("roll (°)", "pitch (°)")}
+    return flights.strips(angles)
 
 
 def scored(rng: np.random.Generator) -> pd.DataFrame:
@@ -78,10 +78,6 @@ CHARTS: dict[str, Draw] = {
     "by image": lambda rng: tracks.errors_by_image(scored(rng)),
     "positions": lambda rng: tracks.positions_map(walk(rng, 90, 2), walk(rng, 90, 2), "black"),
     "aircraft": lambda rng: tracks.aircraft_map(*(walk(rng, 90, 2) for _ in range(3))),
-    "filter": lambda rng: tracks.errors_over_time(
-        np.arange(90), *rng.gamma(2, 3, (2, 90)), "observation", rng.gamma(2, 3, 90)
-    ),
-    "over time": lambda rng: tracks.errors_over_time(TIMES, *rng.gamma(2, 3, (2, 181)), "time (s)"),
     "lags": lambda rng: drawing.correlations_chart(
         {"autocorrelation": {name: (rng.uniform(-1, 1, 20), "black") for name in ("north", "east")}}, [0.2]
     ),
@@ -105,8 +101,8 @@ CHARTS: dict[str, Draw] = {
         {"mekf": rng.gamma(2, 1, (181, 3))}, ["roll (°)", "pitch (°)", "yaw (°)"],
     ),
     "biases": lambda rng: flights.bias_chart(TIMES, walk(rng, 181, 6), rng.gamma(2, 1, (181, 6))),
-    "nis": lambda rng: flights.squares_chart(
-        {name: (TIMES, rng.chisquare(3, 181)) for name in ("position", "velocity")}, 3, "NIS"
+    "nis": lambda rng: drawing.squares_chart(
+        {name: [drawing.Curve(TIMES, rng.chisquare(3, 181), "black")] for name in ("position", "velocity")}, 3
     ),
     "flights": lambda rng: drawing.rows_chart(
         ["a", "a flight with quite a…", "c"], {"": drawing.Values(rng.gamma(2, 1, 3))},

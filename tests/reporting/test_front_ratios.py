@@ -5,17 +5,17 @@ from __future__ import annotations
 import base64
 import math
 import re
-from itertools import pairwise, product
 
 import cv2
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wildlab.evaluation.replication import Closeness, Comparison, Compatibility
 from wildlab.reporting import published_tables as ratios
 from wildlab.reporting.front_page import MOST_PIXELS, read_glimpse, smaller
-from wildlab.reporting.status import FIRST_LOOK, MISSING, Number
+from wildlab.reporting.published import FIRST_LOOK, MISSING, Number
 
 CLOSE, NOT_CLOSE = Closeness.CLOSE, Closeness.NOT_CLOSE
 WITHIN, OUTSIDE = Compatibility.WITHIN, Compatibility.OUTSIDE
@@ -40,39 +40,21 @@ def on_axis(ratio: float, width: float) -> float:
 
 
 @settings(max_examples=60)
-@given(
-    st.lists(st.tuples(st.floats(1e-3, 1e3), st.sampled_from(VERDICTS)), max_size=60),
-    st.sampled_from((1, 3, 5)),
-)
-def test_every_number_is_drawn_where_its_ratio_lies(given_, levels):
-    marks = ratios.arrange_marks([number(*one) for one in given_], levels)
-    assert sorted((round(one.x, 6), one.closeness, one.beyond) for one in marks) == sorted(
-        (round(on_axis(ratio, 320.0), 6), verdict, (ratio > 8) - (ratio < 1 / 8)) for ratio, verdict in given_
-    )
-    assert {one.y for one in marks} <= {8.6 * k for k in range(-(levels // 2), levels // 2 + 1)}
+@given(st.lists(st.tuples(st.floats(1e-3, 1e3), st.sampled_from(VERDICTS)), max_size=60))
+def test_every_number_is_drawn_where_its_ratio_lies(given_):
+    drawn = str(ratios.marks_plot([number(*one) for one in given_], alt="numbers"))
+    found = [float(one) for one in re.findall(r'cx="([\d.]+)"', drawn)]
+    assert found == pytest.approx([on_axis(ratio, 320.0) for ratio, _ in given_], abs=0.051)
 
 
-@settings(max_examples=60)
-@given(st.lists(st.floats(0.2, 5.0), max_size=14))
-def test_no_mark_hides_another_where_there_is_room(given_):
-    numbers = [number(one) for one in given_]
-    levels = ratios.levels_for(numbers, 29)
-    marks = ratios.arrange_marks(numbers, levels)
-    for row in {one.y for one in marks}:
-        xs = sorted(one.x for one in marks if one.y == row)
-        assert all(b - a >= 2 * 3.6 for a, b in pairwise(xs))
-
-
-def test_both_answers_show_without_colour():
-    names, paths = zip(*ratios.SHAPES.values(), strict=True)
-    assert set(ratios.SHAPES) == set(VERDICTS) and len(set(names)) == len(set(paths)) == 5
-    numbers = [number(1.0, *both, how) for both in product(Closeness, Compatibility) for how in ("", "x")]
-    drawn: dict[str, set[object]] = {}
-    for one in numbers:
-        symbol = ratios.mark_symbol(*one.answers, bool(one.fitted))
-        bare = re.sub(r'class="mark \w*"', "", symbol)
-        drawn.setdefault(bare, set()).add((one.answers[0], one.answers[1] == OUTSIDE, bool(one.fitted)))
-    assert len(drawn) == 16 and all(len(one) == 1 for one in drawn.values())
+@pytest.mark.parametrize(
+    ("near", "inside", "colour"),
+    [(CLOSE, OUTSIDE, "no"), (NOT_CLOSE, WITHIN, "yes"), (FIRST_LOOK, WITHIN, ""),
+     (NOT_CLOSE, Compatibility.NOT_JUDGED, "no"), (CLOSE, Compatibility.TOO_FEW, "part")],
+)  # fmt: skip
+def test_a_dot_has_the_colour_of_its_answer(near, inside, colour):
+    drawn = str(ratios.marks_plot([number(1.0, near, inside)], alt="a number"))
+    assert f'class="dot {colour}"' in drawn
 
 
 def png(picture: np.ndarray) -> str:

@@ -9,8 +9,7 @@ import pandas as pd
 import pytest
 
 from wildlab.reporting import georeferencing
-from wildlab.reporting.georeferencing import truth_errors
-from wildlab.reporting.georeferencing_tables import worst_sightings
+from wildlab.reporting.georeferencing import truth_errors, worst_sightings
 
 
 def test_names_that_may_tell_of_a_place_are_numbered_unless_it_is_open():
@@ -41,7 +40,7 @@ def test_a_truth_s_own_error_is_that_of_what_points_are_compared_with():
     assert truth_errors(flown("twin"), scored("walker")) == {}
 
 
-def limits_with(offset=0.0, kind="logged", truth=MappingProxyType({}), certain=False, halves=False, lost=0):
+def limits_with(offset=0.0, kind="logged", truth=MappingProxyType({}), certain=False, lost=0):
     manifest = SimpleNamespace(
         kind=kind, clocks=SimpleNamespace(camera_offset_s=offset), time=SimpleNamespace(kind="utc"),
         vertical=SimpleNamespace(correction_m=0.0),
@@ -53,7 +52,7 @@ def limits_with(offset=0.0, kind="logged", truth=MappingProxyType({}), certain=F
             counts=certain, winner=winner, inseparable=(), extended=False, misfit=False
         ),
         visible_m=np.nan,
-        lost=lost, scored=range(100), halves=SimpleNamespace(disagree=halves),
+        lost=lost, scored=range(100),
     )  # fmt: skip
     return {one.key: dict(one.values) for one in georeferencing.limits(flight, found, truth, [], None)}
 

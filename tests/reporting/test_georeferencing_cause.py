@@ -18,13 +18,13 @@ from wildlab.analysis.verdict import (
 )
 from wildlab.evaluation.causes import Gain
 from wildlab.evaluation.ellipses import EllipseVerdict
-from wildlab.evaluation.errors import AlongAxis, Scatter, summarise
+from wildlab.evaluation.errors import summarise
 from wildlab.evaluation.intervals import Interval
 from wildlab.evaluation.outliers import Outlier
 from wildlab.geometry.calibration import Calibration
 from wildlab.messages.catalogue import load_texts
 from wildlab.reporting import georeferencing as page
-from wildlab.reporting import georeferencing_tables as tables
+from wildlab.reporting import georeferencing as tables
 from wildlab.reporting.report import open_report
 
 MANY = summarise(np.tile([3.0, 4.0], (50, 1)))
@@ -162,22 +162,8 @@ def test_no_cause_is_certain_where_a_third_is_far_out():
     assert diagnosis(MOST, out=5).counts and not diagnosis(MOST, out=6).counts
 
 
-def test_what_is_left_is_sorted_and_its_whole_comes_last():
-    image, within = np.array([0.6, 0.8]), np.array([3.0, 4.0])
-    scatter = Scatter(image, within, np.array([1.2, 1.6]), 5.6)
-    table = tables.parts_table(SimpleNamespace(remaining=scatter))
-    assert table["rms"].tolist() == pytest.approx([5.0, 2.0, 1.0, 5.6])
-    nan = np.full(2, np.nan)
-    unknown = Scatter(nan, nan, nan, np.nan)
-    assert not len(tables.parts_table(SimpleNamespace(remaining=unknown)))
+def test_several_photos_are_called_so():
     assert tables.outliers_table((FAR,))["photo"].tolist() == ["several"]
-
-
-def test_an_axis_is_constant_by_its_interval():
-    one, other = Interval(3.0, 2.0, 4.0), Interval(1.0, -1.0, 3.0)
-    table = tables.axes_table({"north": AlongAxis(one, 0.5, 9), "east": AlongAxis(other, 0.1, 9)})
-    assert table["lasting"].tolist() == [True, False]
-    assert table["share"].tolist() == [50.0, 10.0]
 
 
 def test_parameters_are_called_different_from_zero_by_their_interval():

@@ -142,12 +142,12 @@ def figures_of(one: str, other: str) -> Iterator[tuple[Figure, set[str]]]:
     followed, lives = made(1, tracks=3, looks=12, name=one.replace("{", "").replace("}", "") + "{}")
     for figure in (tracks.tracks_shown(followed), tracks.identities_shown(followed, lives)):
         yield figure[0], set()
-    poses = {name: (TIMES, {"roll (°)": TIMES, "yaw (°)": TIMES}) for name in (one, f"{other}'")}
-    yield flights.strips(poses), {one, f"{other}'"}
+    poses = {name: (TIMES, TIMES) for name in (one, f"{other}'")}
+    yield flights.strips({"roll (°)": poses, "yaw (°)": poses}), {one, f"{other}'"}
     error = {one: WAY[:, :3]}
     yield flights.error_bands(TIMES, error, error, ["a", "b", "c"]), set()
     clock = flights.Clock(0.0, TIMES[-1])
-    yield flights.lines_chart({one: (TIMES, TIMES), f"{other}'": (TIMES, TIMES)}, clock, one), {one}
+    yield flights.strips({one: poses}, clock), {one}
     yield tracks.track_map(WAY, {"a": WAY}, {"a": one}), {one}
     yield drawing.rows_chart([one, other], {"": drawing.Values([1.0, 2.0])}, one, size=(4.6, 2.0)), set()
     curves = pd.DataFrame({"detector": [one, one], "recall": [0.1, 0.2], "precision": [1.0, 0.9]})

@@ -10,17 +10,18 @@ from hypothesis import strategies as st
 
 from wildlab.evaluation.replication import Closeness, Comparison, Compatibility
 from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY, MOSTLY_NOT, NO_PREMISE, UNDECIDED
-from wildlab.reporting.published import bounds_of, spread_key
-from wildlab.reporting.report import open_report
-from wildlab.reporting.status import (
+from wildlab.reporting.published import (
     ALONE,
     AS_PUBLISHED,
     IN_PART,
     LEVELS,
     NOT_AS_PUBLISHED,
     OPEN,
+    bounds_of,
+    spread_key,
     standing,
 )
+from wildlab.reporting.report import open_report
 from wildlab.studies import page
 
 

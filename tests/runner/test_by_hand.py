@@ -14,7 +14,7 @@ from tests.notebooks import run_here
 from wildlab.errors import WildlabError
 from wildlab.flight.catalog import is_fetched
 from wildlab.paths import NOTEBOOKS
-from wildlab.runner import flights
+from wildlab.runner import catalogue as flights
 from wildlab.runner.catalogue import StudyEntry, load_studies
 from wildlab.runner.open_study import open_study
 from wildlab.runner.shell import CellError

@@ -19,13 +19,13 @@ from wildlab.flight.store import load_flight, save_flight
 from wildlab.reporting import notebook_pages as html
 from wildlab.reporting.metrics import metric
 from wildlab.reporting.report import open_report
-from wildlab.runner.compare import compare_flights
+from wildlab.runner.evaluate import compare_flights
 from wildlab.runner.job import FILES
 from wildlab.runner.ledger import own_flights
 from wildlab.runner.provenance import changed_notice, footer, provenance_of_flight, verify_report
 from wildlab.runner.seeds import SeedWork, read_seed, write_seed
 from wildlab.runner.status import as_plain, misfits, read_status, seal, study_status
-from wildlab.sharing.reports import sources_of
+from wildlab.sharing.recomputation import sources_of
 
 NUMBERS = [metric("rmse", f"part-{n}", 1.5 + n / 7, "m", n=20, low=0.5, high=9.0) for n in range(12)]
 VALUES = {"rmse": 1.25, "nees": 2.5}

@@ -14,7 +14,7 @@ from tests.notebooks import OPEN, notebook, write
 from wildlab.errors import WildlabError
 from wildlab.files import write_json
 from wildlab.flight.store import Flight, load_flight, save_flight
-from wildlab.runner import flights
+from wildlab.runner import catalogue as flights
 from wildlab.runner.evaluate import evaluate_flight, refuse_other_flight
 from wildlab.runner.provenance import provenance_of_flight
 from wildlab.runner.run import run_studies

@@ -20,9 +20,8 @@ from tools import front_flight
 from wildlab.reporting import metrics
 from wildlab.reporting import notebook_pages as html
 from wildlab.reporting.front_page import FLIGHT, Glimpse, case_cards, front_page
-from wildlab.reporting.published import published_rows
+from wildlab.reporting.published import StudyStatus, published_rows
 from wildlab.reporting.published_tables import CALCULATIONS, count_answers
-from wildlab.reporting.status import StudyStatus
 from wildlab.runner.catalogue import StudyEntry, load_studies
 from wildlab.runner.ledger import build_ledger
 from wildlab.runner.status import study_status

@@ -228,7 +228,7 @@ def test_a_run_that_is_broken_off_keeps_the_former_report(tmp_path, number):
 KILLED = """
 import multiprocessing, shutil, subprocess, sys, time
 from pathlib import Path
-from wildlab.runner import notebook_process
+from wildlab.runner import job as notebook_process
 from wildlab.runner.processes import start_process
 from wildlab.runner.job import Job
 
@@ -238,7 +238,7 @@ def body(pipe, job, begun):
         child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(300)"])
         Path(begun).touch()
         child.wait()
-        return ("done",)
+        return ("done", None)
     notebook_process._outcome = outcome
     shutil.rmtree = lambda folder, **more: (time.sleep(1.0), remove(folder, **more))
     notebook_process.run_notebook(pipe, job)

@@ -18,11 +18,11 @@ from wildlab.errors import RunFailed
 from wildlab.paths import NOTEBOOKS
 from wildlab.runner import open_study
 from wildlab.runner import seeds as fingerprint
-from wildlab.runner.job import Job
 from wildlab.runner.open_study import trials_table
-from wildlab.runner.scheduling import _waiting
+from wildlab.runner.scheduling import _Study
 from wildlab.runner.seeds import (
     SeedWork,
+    answer,
     make_work,
     missing_seeds,
     other_seeds,
@@ -31,7 +31,6 @@ from wildlab.runner.seeds import (
     sweep_seeds,
     write_seed,
 )
-from wildlab.runner.worker_pool import answer
 from wildlab.studies import protocol
 
 PARAMETERS = {"twin": "static-antenna", "not its own": 3}
@@ -207,7 +206,7 @@ def test_a_run_computes_damaged_seeds_again(tmp_path):
     for seed in (1, 2):
         write_seed(one, seed, VALUES)
     (one.folder / "2.json").write_text("{}")
-    waiting, told = _waiting(Job(one.study, "", "", "", "", seeds=one)), list[tuple[str, object]]()
+    waiting, told = _Study(one.study, one), list[tuple[str, object]]()
     waiting.start(lambda name, event, what: told.append((event, what)))
     assert list(waiting.seeds) == [2, 3] and not waiting.ready
     assert dict(told)["seeds"] == (2, 3)

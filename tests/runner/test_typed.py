@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from tests.analysis.robots import robot_flight
 from wildlab.flight.store import save_flight
 from wildlab.paths import REPORTS
-from wildlab.runner import evaluate, track
+from wildlab.runner import evaluate
 from wildlab.runner.job import Job, other_reports, typed, typed_in_report
 
 
@@ -50,11 +50,11 @@ def test_a_report_that_failed_is_asked_for_again_as_it_was(tmp_path, monkeypatch
         jobs.extend(job for one in passes for job in one)
         return []
 
-    monkeypatch.setattr(track, "run_alone", keep)
+    monkeypatch.setattr(evaluate, "run_alone", keep)
     monkeypatch.setattr(evaluate, "run_all", keep_all)
     told: dict[str, Any] = {"settings": Path("s.toml"), "sensors": ("radar",), "into": tmp_path / "out"}
-    track.track_flight(folder, filters=("ekf", "ukf"), smooth=True, **told)
-    track.track_many(folder, **told)
+    evaluate.track_flight(folder, filters=("ekf", "ukf"), smooth=True, **told)
+    evaluate.track_many(folder, **told)
     evaluate.evaluate_flight(folder, reports=tmp_path / "reports")
     start = "wildlab track 'flights/my boat'"
     assert jobs[0].again == (

@@ -20,10 +20,10 @@ from wildlab.errors import WildlabError
 from wildlab.files import write_json
 from wildlab.flight.store import save_flight
 from wildlab.reporting.text import page
+from wildlab.runner.evaluate import MANY_NOTEBOOK as NOTEBOOK
 from wildlab.runner.status import seal
-from wildlab.runner.track import MANY_NOTEBOOK as NOTEBOOK
 from wildlab.sharing.allow_list import Chapter, join_chapters, read_part
-from wildlab.sharing.reports import sources_of
+from wildlab.sharing.recomputation import sources_of
 from wildlab.sharing.share import (
     check_password,
     private_folder,

@@ -27,13 +27,12 @@ from wildlab.files import write_json
 from wildlab.flight.manifest import Manifest
 from wildlab.flight.store import load_flight, save_flight
 from wildlab.reporting.metrics import AGAINST, metric
+from wildlab.reporting.published import Number
 from wildlab.reporting.published_tables import strip
-from wildlab.reporting.status import Number
 from wildlab.reporting.text import escape, page
 from wildlab.runner.scheduling import Outcome
 from wildlab.sharing import recomputation as redrawn
-from wildlab.sharing.recomputation import share_apart
-from wildlab.sharing.reports import of_a_study
+from wildlab.sharing.recomputation import of_a_study, share_apart
 from wildlab.sharing.share import share
 from wildlab.sharing.tiers import describe
 from wildlab.simulation.parameters import load_twin

@@ -24,9 +24,9 @@ from wildlab.errors import RunFailed
 from wildlab.flight.manifest import read_settings
 from wildlab.flight.store import Flight, load_flight, save_flight
 from wildlab.reporting.metrics import metric
+from wildlab.runner.evaluate import MANY_NOTEBOOK as NOTEBOOK
+from wildlab.runner.evaluate import track_many
 from wildlab.runner.scheduling import Outcome
-from wildlab.runner.track import MANY_NOTEBOOK as NOTEBOOK
-from wildlab.runner.track import track_many
 from wildlab.sharing import generalisation as neutral
 from wildlab.sharing import recomputation as redrawn
 from wildlab.sharing.share import share

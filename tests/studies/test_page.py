@@ -10,9 +10,9 @@ import pytest
 
 from wildlab.evaluation.replication import Closeness, Comparison, Compatibility
 from wildlab.messages.catalogue import PageTexts, TileText
+from wildlab.reporting.published import Number
 from wildlab.reporting.published_tables import published_table
 from wildlab.reporting.report import Wording
-from wildlab.reporting.status import Number
 from wildlab.studies.page import tile_of
 
 

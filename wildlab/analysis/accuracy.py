@@ -35,15 +35,10 @@ from wildlab.evaluation.ellipses import (
     spread_of_sightings,
 )
 from wildlab.evaluation.errors import (
-    AlongAxis,
     ErrorSummary,
-    Scatter,
     bootstrap_interval,
-    scatter_by_image,
-    split_along,
     summarise,
 )
-from wildlab.evaluation.intervals import Halves, compare_halves
 from wildlab.evaluation.outliers import largest_visible
 from wildlab.flight.calibration_files import (
     UNITS,
@@ -56,7 +51,7 @@ from wildlab.flight.calibration_files import (
     read_learnt,
     refuse_other_camera,
 )
-from wildlab.flight.clocks import poses_at, truth_at
+from wildlab.flight.clocks import truth_at
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.geometry.attitude_uncertainty import tilt_and_heading
@@ -89,13 +84,8 @@ class Accuracy:
         The standard deviations that the ellipses come from.
     ellipses
         What they are worth.
-    axes, halves
-        Errors along axes, and first half beside second.
     diagnosis
         The cause, where six images or more show a known point.
-    remaining
-        What the errors are made of once the cause is taken off, or as they are where no cause gained anything
-        for certain; without what is far out.
     visible_m
         Where each point is held against the nearest mark: larger errors go to another one; else NaN.
     """
@@ -108,10 +98,7 @@ class Accuracy:
     lost: int
     assumed: dict[str, float]
     ellipses: EllipseVerdict
-    axes: dict[str, AlongAxis]
-    halves: Halves
     diagnosis: Diagnosis | None
-    remaining: Scatter
     visible_m: float
 
     @property
@@ -164,13 +151,6 @@ def judge_accuracy(
         for name, figure in figures.items():
             low, high = bootstrap_interval(figure, errors, blocks, rng)
             intervals[name] = max(low, 0.0), high
-    left, of = errors, scored
-    if diagnosis is not None and diagnosis.counts:
-        left, of = diagnosis.winner.held, diagnosis.scored
-    elif diagnosis is not None:
-        left, of = errors_of(diagnosis.scored), diagnosis.scored
-    if diagnosis is not None:
-        left, of = left[diagnosis.inliers], of[diagnosis.inliers]
     by_nearest = flight.manifest.scoring.rule == "nearest"
     return Accuracy(
         observations=observations,
@@ -181,10 +161,7 @@ def judge_accuracy(
         lost=int((~np.isfinite(scored["error_m"])).sum()),
         assumed=used_deviations(observations, deviations),
         ellipses=judge_ellipses(errors, covariances_of(scored), blocks, rng),
-        axes=split_along(errors, axes_of(observations, scored), blocks),
-        halves=compare_halves(scored["error_m"].to_numpy(float), blocks),
         diagnosis=diagnosis,
-        remaining=scatter_by_image(left, of["frame_id"]),
         visible_m=visible_error(flight, scored) if by_nearest else np.nan,
     )
 
@@ -591,63 +568,6 @@ def _facts(observations: Observations, learnt: Learnt) -> list[Fact]:
 
 def _range(values: np.ndarray) -> tuple[float, float]:
     return float(np.nanmin(values)), float(np.nanmax(values))
-
-
-#: A camera or a track slower than this has no direction (m/s), and a view nearer to straight down than this
-#: share of its height neither.
-SLOWEST_M_S = 1.0
-STEEPEST = 0.05
-
-
-def axes_of(observations: Observations, scored: pd.DataFrame) -> dict[str, Array]:
-    """Unit vectors (N, 2), north-east, of the axes that a scored table's errors are split along.
-
-    Parameters
-    ----------
-    observations
-        Those that the table was made from.
-    scored
-        From `score_points`, N rows.
-
-    Returns
-    -------
-    dict
-        ``north``, ``east``; ``away from the camera`` and ``to the right of the line of sight``, on the
-        ground; where the poses have times, ``along the course`` and ``to the right of the course``. NaN where
-        a point has no such axis.
-    """
-    rows = pd.Index(observations.table["detection_id"]).get_indexer(pd.Index(scored["detection_id"]))
-    camera = observations.poses.p_nc[rows]
-    sight = scored[["north_m", "east_m"]].to_numpy(float) - camera[:, :2]
-    drop = observations.plane_down[rows] - camera[:, 2]
-    away = _unit(sight, STEEPEST * np.abs(drop))
-    one = np.ones(len(scored))
-    axes = {
-        "north": np.column_stack([one, 0 * one]),
-        "east": np.column_stack([0 * one, one]),
-        "away from the camera": away,
-        "to the right of the line of sight": _right(away),
-    }
-    flight = observations.flight
-    nav = flight.nav[observations.source]
-    if flight.timed and "frame_id" not in nav:
-        times = scored["time_s"].to_numpy(float)
-        after, before = (poses_at(nav, times + shift)[0][:, :2] for shift in (0.5, -0.5))
-        track = _unit(after - before, np.full(len(times), SLOWEST_M_S))
-        if np.isfinite(track).any():
-            axes |= {"along the course": track, "to the right of the course": _right(track)}
-    return axes
-
-
-def _unit(vectors: Array, least: Array) -> Array:
-    length = np.hypot(*vectors.T)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.where((length > least)[:, None], vectors / length[:, None], np.nan)
-
-
-def _right(axis: Array) -> Array:
-    """A quarter turn clockwise, seen from above (north, east)."""
-    return np.column_stack([-axis[:, 1], axis[:, 0]])
 
 
 #: How far headings may lie from their mean, rad, for a flight on one heading: a turned camera and a shifted

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from wildlab.commands import shared
-from wildlab.commands.shared import ANY, FILE, FOLDER, refuse_existing
+from wildlab.commands.shared import ANY, FILE, FOLDER, pair, refuse_existing
 from wildlab.errors import WildlabError
 from wildlab.terminal import print_json, print_table, shown, stopped
 
@@ -20,38 +20,29 @@ if TYPE_CHECKING:
 LENGTHS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 
 
-class Length(click.ParamType[float]):
-    """A length with its unit: 25mm; metres come out."""
-
-    name = "LENGTH"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        found = re.fullmatch(r"(\d+(?:\.\d+)?|\.\d+)\s*(mm|cm|m)", str(value))
-        if found is None or not 0 < float(found[1]) * LENGTHS[found[2]] <= 100:
-            self.fail(f"{value!r} is no length above zero with its unit: write 25mm, 2.5cm or 0.025m.")
-        return float(found[1]) * LENGTHS[found[2]]
+def metres(text: str) -> float:
+    """A length with its unit, 25mm, in metres."""
+    found = re.fullmatch(r"(\d+(?:\.\d+)?|\.\d+)\s*(mm|cm|m)", text)
+    if found is None or not 0 < float(found[1]) * LENGTHS[found[2]] <= 100:
+        raise click.BadParameter(f"{text!r} is no length above zero with its unit: write 25mm or 0.025m.")
+    return float(found[1]) * LENGTHS[found[2]]
 
 
-class Grid(click.ParamType[tuple[int, int]]):
-    """Columns and rows: 9x6."""
-
-    name = "CxR"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[int, int]:
-        found = re.fullmatch(r"(\d{1,3})\s*[x×X]\s*(\d{1,3})", str(value))
-        if found is None:
-            self.fail(f"{value!r} is no number of columns and rows: write 9x6.")
-        return int(found[1]), int(found[2])
+GRID = pair(int, "xX×", "9x6")
 
 
 @click.command()
 @click.argument("images", nargs=-1, required=True, type=ANY)
-@click.option("--board", type=Grid(), help="A chessboard's inner corners: 9x6.")
-@click.option("--circles", type=Grid(), help="A grid of circles: 7x7.")
+@click.option("--board", type=GRID, metavar="CxR", help="A chessboard's inner corners: 9x6.")
+@click.option("--circles", type=GRID, metavar="CxR", help="A grid of circles: 7x7.")
 @click.option("--staggered", is_flag=True, help="Every other row is moved by half a step (4x11).")
-@click.option("--square", type=Length(), required=True, help="From corner to corner, or circle to circle.")
+@click.option(
+    "--square",
+    type=metres,
+    metavar="LENGTH",
+    required=True,
+    help="From corner to corner, or circle to circle.",
+)
 @shared.out(FILE, "The file to write: camera.toml.")
 @shared.overwrite
 @click.option("--name", default="camera", show_default=True)
@@ -271,8 +262,7 @@ def calibrate(flight: Path, out: Path, overwrite: bool, source: str | None, seed
     from wildlab.flight.calibration_files import write_calibration
     from wildlab.flight.checks.check import sense_sentences
     from wildlab.flight.store import load_flight
-    from wildlab.reporting.georeferencing import words_of_causes
-    from wildlab.reporting.georeferencing_tables import simplest_rivals
+    from wildlab.reporting.georeferencing import simplest_rivals, words_of_causes
 
     refuse_existing(out, overwrite)
     loaded = load_flight(flight)

@@ -79,7 +79,7 @@ def compare(flights: tuple[Path, ...], out: Path | None, reports: Path) -> None:
       wildlab compare flights/tuesday flights/wednesday
       wildlab compare flights/tuesday reports/monday-overview --out together
     """
-    from wildlab.runner.compare import compare_flights
+    from wildlab.runner.evaluate import compare_flights
 
     click.echo(shown(compare_flights(flights, into=out, reports=reports, console=terminal_console())))
 
@@ -173,7 +173,7 @@ def track(
       wildlab track flights/harbour --many --settings settings.toml
     """
     start_server()
-    from wildlab.runner.track import refuse_unfit, track_flight, track_many
+    from wildlab.runner.evaluate import refuse_unfit, track_flight, track_many
 
     console = terminal_console()
     outcome: Outcome

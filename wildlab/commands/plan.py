@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from wildlab.commands import shared
-from wildlab.commands.shared import FILE, FOLDER, Pair, terminal_console, terrain_of, terrain_options
+from wildlab.commands.shared import FILE, FOLDER, pair, terminal_console, terrain_of, terrain_options
 from wildlab.errors import WildlabError
 from wildlab.paths import DATA
 from wildlab.terminal import print_json, shown
@@ -33,7 +33,7 @@ def _numbers(command: Callable[..., Any]) -> Callable[..., Any]:
 @click.argument("area", type=FILE)
 @shared.out(FOLDER, "Folder for way points, maps and the page.", required=True)
 @click.option("--camera", type=FILE, help="What `wildlab camera` wrote.")
-@click.option("--image", type=Pair("CxR", "xX×", "640x512"), help="Without it: columns x rows.")
+@click.option("--image", type=pair(int, "xX×", "640x512"), metavar="CxR", help="Without it: columns x rows.")
 @click.option("--focal", type=float, help="With --image: focal length, px.")
 @click.option("--view", type=float, help="Or field of view across, deg.")
 @click.option("--terrain", type=FILE, help="Map of heights: they follow it, and it hides.")
@@ -46,7 +46,9 @@ def _numbers(command: Callable[..., Any]) -> Callable[..., Any]:
     show_default=True,
     help="How the camera swings; adaptive keeps to the areas (F 5.4).",
 )
-@click.option("--home", type=Pair("LAT,LON", ",; ", "58.66,16.46"), help="Take-off.  [default: row 1]")
+@click.option(
+    "--home", type=pair(float, ",; ", "58.66,16.46"), metavar="LAT,LON", help="Take-off.  [default: row 1]"
+)
 @click.option(
     "--above",
     "heights",
@@ -63,7 +65,7 @@ def plan(
     area: Path,
     out: Path,
     camera: Path | None,
-    image: tuple[float, float] | None,
+    image: tuple[int, int] | None,
     focal: float | None,
     view: float | None,
     terrain: Path | None,
@@ -118,7 +120,7 @@ def plan(
 
 
 def lens(
-    camera: Path | None, image: tuple[float, float] | None, focal: float | None, view: float | None
+    camera: Path | None, image: tuple[int, int] | None, focal: float | None, view: float | None
 ) -> Camera:
     """The camera, from its file or from what its sheet says.
 
@@ -159,9 +161,9 @@ def lens(
             "give --camera FILE, or --image COLUMNSxROWS with either --focal or --view",
         )
     columns, rows = image
-    if not (2 <= columns <= 100_000 and 2 <= rows <= 100_000 and columns % 1 == 0 and rows % 1 == 0):
-        problem = f"an image of {columns:g} x {rows:g} pixels"
-        raise WildlabError(problem, "give whole numbers, as 640x512", field="--image")
+    if not (2 <= columns <= 100_000 and 2 <= rows <= 100_000):
+        problem = f"an image of {columns} x {rows} pixels"
+        raise WildlabError(problem, "give it as 640x512", field="--image")
     length = math.nan if focal is None else focal
     if view is not None:
         if not 1 <= view <= 170:
@@ -170,4 +172,4 @@ def lens(
         length = columns / 2 / math.tan(math.radians(view) / 2)
     if not 1 <= length <= 1e6:
         raise WildlabError(f"a focal length of {length:g} px", "give pixels above 1", field="--focal")
-    return Camera(int(columns), int(rows), length, length, columns / 2, rows / 2)
+    return Camera(columns, rows, length, length, columns / 2, rows / 2)

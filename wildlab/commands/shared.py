@@ -3,7 +3,6 @@ is shown."""
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -40,40 +39,23 @@ def out(kind: click.ParamType[Path], text: str, **more: Any) -> Callable[[Comman
     return click.option("--out", type=kind, help=text, **more)
 
 
-class Minutes(click.ParamType[float]):
-    """A number of minutes above zero; nan and infinity, which pass for numbers, are refused."""
+timeout = click.option(
+    "--timeout", type=click.FloatRange(0, 525_600, min_open=True), help="Minutes for a notebook or a seed.  "
+    "[default: 30]",
+)  # fmt: skip
 
-    name = "minutes"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+def pair(kind: Callable[[str], Any], between: str, example: str) -> Callable[[str], tuple[Any, Any]]:
+    """A kind of value: two numbers with something between them, 640x512, or 58.66,16.46."""
+
+    def convert(text: str) -> tuple[Any, Any]:
         try:
-            minutes = float(value)
+            one, other = map(kind, re.split(rf"\s*[{between}]\s*", text.strip()))
         except ValueError:
-            minutes = math.nan
-        if not 0 < minutes <= MOST_MINUTES:
-            self.fail(f"{value!r} is not a number of minutes: give one above 0, at most {MOST_MINUTES}.")
-        return minutes
-
-
-#: A year.
-MOST_MINUTES = 525_600
-timeout = click.option("--timeout", type=Minutes(), help="Minutes for a notebook or a seed.  [default: 30]")
-
-
-class Pair(click.ParamType[tuple[float, float]]):
-    """Two numbers with something between them: 640x512, or 58.66,16.46."""
-
-    def __init__(self, name: str, between: str, example: str) -> None:
-        self.name, self.between, self.example = name, between, example
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[float, float]:
-        try:
-            one, other = (float(part) for part in re.split(rf"\s*[{self.between}]\s*", str(value).strip()))
-        except ValueError:
-            self.fail(f"{value!r} is not two numbers: write {self.example}.")
+            raise click.BadParameter(f"{text!r} is not two numbers: write {example}.") from None
         return one, other
+
+    return convert
 
 
 def refuse_existing(file: Path | None, overwrite: bool) -> None:

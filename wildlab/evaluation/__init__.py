@@ -11,10 +11,9 @@ Floating Objects using UAVs with Optical Sensors, doctoral thesis, NTNU 2019.
 - `gospa`: how far is a set of tracks? `compare_identities`: who follows whom, how long, and how well.
 - `estimate_position_noise`: how rough is the truth itself?
 - `mean_interval`, `mean_share_interval`, `share_interval`: what do so many independent runs say?
-- `summarise`, `scatter_by_image`, `bootstrap_interval`: single positions, and why they err;
-  `time_blocks`, `block_mean`, `compare_halves`: in blocks in time order.
+- `summarise`, `bootstrap_interval`: single positions; `time_blocks`, `block_mean`: in blocks in time order.
 - `held_out`, `gain_of`, `rank_models`: which constant error is behind them, `estimate_wander`: against noise
-  that is correlated in time; `split_along`; `find_outliers`.
+  that is correlated in time; `find_outliers`.
 - `judge_ellipses`, `spread_of_sightings`: what they are worth.
 """
 
@@ -49,23 +48,17 @@ if TYPE_CHECKING:
         spread_of_sightings,
     )
     from wildlab.evaluation.errors import (
-        AlongAxis,
         ErrorSummary,
-        Scatter,
         TrackErrors,
         TrackSummary,
         bootstrap_interval,
-        scatter_by_image,
-        split_along,
         summarise,
         summarise_track,
     )
     from wildlab.evaluation.identities import Gospa, Identities, Moment, compare_identities, gospa
     from wildlab.evaluation.intervals import (
-        Halves,
         Interval,
         block_mean,
-        compare_halves,
         mean_interval,
         mean_share_interval,
         share_interval,
@@ -78,20 +71,17 @@ else:
 
 __all__ = [
     "ERROR_CONVENTION",
-    "AlongAxis",
     "Average",
     "EllipseVerdict",
     "ErrorSummary",
     "Gain",
     "Gospa",
-    "Halves",
     "Identities",
     "Interval",
     "Linear",
     "Moment",
     "Outlier",
     "Ranked",
-    "Scatter",
     "Spread",
     "TrackErrors",
     "TrackSummary",
@@ -102,7 +92,6 @@ __all__ = [
     "block_mean",
     "bootstrap_interval",
     "chi_square_interval",
-    "compare_halves",
     "compare_identities",
     "effective_sample_size",
     "estimate_position_noise",
@@ -121,10 +110,8 @@ __all__ = [
     "portmanteau",
     "position_nees",
     "rank_models",
-    "scatter_by_image",
     "share_inside",
     "share_interval",
-    "split_along",
     "spread_of_sightings",
     "summarise",
     "summarise_track",

@@ -5,14 +5,14 @@ All errors are truth minus estimate, as H (3.11) has them (`consistency.ERROR_CO
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.evaluation.intervals import PROBABILITY, Interval, block_mean, widening
+from wildlab.evaluation.intervals import widening
 from wildlab.geometry.frames import wrap
 
 Array = NDArray[np.float64]
@@ -62,65 +62,6 @@ def summarise(errors: ArrayLike) -> ErrorSummary:
         ),
         *(float(x) for x in (*e.mean(axis=0), *sd)),
     )
-
-
-#: Errors beside another of their image from which the spread within images is estimated, at least: its
-#: standard deviation is then known to about a quarter.
-FEWEST_WITHIN = 10
-
-
-class Scatter(NamedTuple):
-    """Mean squared horizontal error split into what is constant, per image, and within images.
-
-    ``between_sd``, ``within_sd`` and ``bias``, the mean, are metres per axis (north, east).
-    """
-
-    between_sd: Array
-    within_sd: Array
-    bias: Array
-    whole_m: float
-
-    @property
-    def parts_m(self) -> tuple[float, float, float]:
-        """Root mean squares of the constant part, that of images and that within them: m, horizontal."""
-        bias, image, within = (float(np.hypot(*of)) for of in (self.bias, self.between_sd, self.within_sd))
-        return bias, image, within
-
-
-def scatter_by_image(errors: ArrayLike, image: ArrayLike) -> Scatter:
-    """Where errors come from: a constant, each image's own pose, or single clicks.
-
-    One-way analysis of variance with images as the groups, per axis.
-
-    Parameters
-    ----------
-    errors
-        (N, 2) north, east in n, m; rows with NaN are left out.
-    image
-        (N,) which image each belongs to: numbers or names.
-
-    Returns
-    -------
-    Scatter
-        All NaN where fewer than two images are left, or fewer than `FEWEST_WITHIN` errors beside another of
-        their image: how errors within an image differ is then anybody's guess.
-    """
-    e = np.asarray(errors, float).reshape(-1, 2)
-    keep = np.isfinite(e).all(axis=1)
-    e, group = e[keep], np.unique(np.asarray(image)[keep], return_inverse=True)[1]
-    count = np.bincount(group)
-    n, k = len(e), len(count)
-    if n - k < FEWEST_WITHIN or k < 2:
-        nan = np.full(2, np.nan)
-        return Scatter(nan, nan, nan, float("nan"))
-    mean = e.mean(axis=0)
-    of_image = np.stack([np.bincount(group, weights=e[:, axis]) / count for axis in (0, 1)], axis=-1)
-    within = ((e - of_image[group]) ** 2).sum(axis=0) / (n - k)
-    mean_square = (count[:, None] * (of_image - mean) ** 2).sum(axis=0) / (k - 1)
-    usual = (n - (count**2).sum() / n) / (k - 1)
-    between = np.maximum((mean_square - within) / usual, 0.0)
-    whole = float(np.sqrt((e**2).sum(axis=1).mean()))
-    return Scatter(np.sqrt(between), np.sqrt(within), mean, whole)
 
 
 def bootstrap_interval(
@@ -298,79 +239,3 @@ def _mean(values: Array) -> float:
 
 def _root_mean_square(values: Array) -> float:
     return float(np.sqrt(_mean(values**2)))
-
-
-#: Share of the squared error below which a constant is of no consequence.
-NEGLIGIBLE = 0.05
-
-
-class AlongAxis(NamedTuple):
-    """Errors along one axis.
-
-    Attributes
-    ----------
-    mean
-        Of the component, m, with its interval from the blocks: those of all axes hold at once, where blocks
-        are longer than errors last. NaN where it is wider than the errors lie apart: of too few independent
-        blocks it says nothing.
-    share
-        Of the mean square of the whole error that a constant of that size takes off, 0 to 1.
-    n
-        Points that have the axis.
-    """
-
-    mean: Interval
-    share: float
-    n: int
-
-    @property
-    def told(self) -> bool:
-        """Whether the interval of the mean leaves zero out."""
-        return bool(self.mean.low > 0 or self.mean.high < 0)
-
-    @property
-    def constant(self) -> bool:
-        """Whether it does, and the constant matters; what wanders more slowly than the flight does, too."""
-        return self.told and self.share >= NEGLIGIBLE
-
-
-def split_along(
-    errors: ArrayLike, axes: Mapping[str, ArrayLike], blocks: ArrayLike, probability: float = PROBABILITY
-) -> dict[str, AlongAxis]:
-    """Mean error along each axis, by name.
-
-    Parameters
-    ----------
-    errors
-        (N, 2) north-east, m; rows with NaN are left out.
-    axes
-        Unit vectors (N, 2) or (2,), by name; a point with NaN there has no such axis.
-    blocks
-        (N,) from `wildlab.evaluation.intervals.time_blocks`.
-    probability
-        With which all the intervals hold at once.
-
-    Returns
-    -------
-    dict
-        An `AlongAxis` for each axis that any point has.
-
-    Examples
-    --------
-    >>> split_along([[3.0, 0.0], [3.0, 1.0]], {"north": [1.0, 0.0]}, [0, 1])["north"].mean.estimate
-    3.0
-    """
-    e = np.asarray(errors, float)
-    squares = float(np.nansum((e**2).sum(axis=1)))
-    found = {}
-    each = 1 - (1 - probability) / max(len(axes), 1)
-    for name, vectors in axes.items():
-        component = (e * np.asarray(vectors, float)).sum(axis=1)
-        n = int(np.isfinite(component).sum())
-        if n:
-            mean = block_mean(component, blocks, each)
-            if mean.high - mean.low > np.nanmax(component) - np.nanmin(component):
-                mean = Interval(mean.estimate, np.nan, np.nan)
-            share = n * mean.estimate**2 / squares if squares > 0 else 0.0
-            found[name] = AlongAxis(mean, float(share), n)
-    return found

@@ -266,6 +266,7 @@ COLOURS = {
     "truth": "#000000",
     "measurement": GREY,
     "recorded": GREY,
+    "ground": GREY,
     # sources of a pose
     "autopilot": ORANGE,
     "observer": GREEN,

@@ -27,6 +27,7 @@ from wildlab.evaluation.shares import HOLDS, MOSTLY, SHARE_VERDICTS, expected_wr
 from wildlab.messages.catalogue import fill, load_texts
 from wildlab.paths import DATA
 from wildlab.reporting import published_tables as published
+from wildlab.reporting.published import FIRST_LOOK, Case, Number, StudyStatus
 from wildlab.reporting.published_tables import (
     LONGEST,
     PREDICTED,
@@ -38,7 +39,6 @@ from wildlab.reporting.published_tables import (
     summed_up,
     tested_on,
 )
-from wildlab.reporting.status import FIRST_LOOK, Case, Number, StudyStatus
 from wildlab.reporting.text import PILLS, TAGS, page, prose, read_style, render, table_html
 
 #: The page, beside the ledger.
@@ -445,7 +445,7 @@ def front_page(
         learn=learn,
         checkout=checkout,
         close=published.MARGIN,
-        legend=published.marks_legend(n for one in study_cards for n in one.numbers),
+        marked=any(one.numbers for one in study_cards),
         # How many studies are done is said above.
         counts=_tiles(studies)[1:],
         pages={"flights": FLIGHTS, "partners": PARTNERS, "ledger": LEDGER},
@@ -500,7 +500,7 @@ def ledger_page(studies: Iterable[StudyStatus], *, code: str = "", cases: Sequen
     body = render(
         "ledger",
         tiles=_tiles(studies),
-        studies=[(one, _tag(one), _in_short(one)) for one in studies],
+        studies=[(one, study_tag(one), _in_short(one)) for one in studies],
         summed_up=summed_up,
         numbers_table=partial(published_table, ledger=True),
         claims_table=_claims,
@@ -573,16 +573,6 @@ def _tiles(studies: Sequence[StudyStatus]) -> list[tuple[str, str]]:
 def _waiting(count: int) -> str:
     """How many have no verdict: their study has not been run, or not in full, or says why it gives none."""
     return f"; {count} without a verdict" if count else ""
-
-
-def _tag(one: StudyStatus) -> str:
-    study = one.study
-    if study.kind == "twin":
-        flights = f", {one.seeds} flights" if one.seeds and one.seeds > 1 else ""
-        return f"twin: {study.twin}{flights}"
-    if study.kind == "logged":
-        return f"logged: {one.flight or study.dataset or study.recipe}"
-    return TAGS["computed"]
 
 
 def _rule() -> Markup:

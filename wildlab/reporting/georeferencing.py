@@ -16,7 +16,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.analysis import Fact
-from wildlab.analysis.accuracy import Accuracy, Repeats, on_one_heading
+from wildlab.analysis.accuracy import Accuracy, Repeats, corrections, on_one_heading
 from wildlab.analysis.diagnose import CAUSES, Diagnosis, nonzero
 from wildlab.analysis.georeference import errors_of
 from wildlab.analysis.verdict import (
@@ -29,32 +29,19 @@ from wildlab.analysis.verdict import (
     is_possible,
     verdict_of,
 )
+from wildlab.evaluation.correlated_errors import WanderNoise
 from wildlab.evaluation.ellipses import EllipseVerdict, is_conservative
 from wildlab.evaluation.errors import ErrorSummary, summarise
+from wildlab.evaluation.outliers import Outlier
 from wildlab.flight.store import Flight
+from wildlab.geometry.calibration import BORESIGHT, Calibration
 from wildlab.messages.catalogue import Message, PageTexts, load_texts, words
-from wildlab.messages.quantities import measure, percent_of, significant
+from wildlab.messages.quantities import length, measure, percent_of, significant
 from wildlab.names import listed
 from wildlab.reporting.charts.drawing import sightings_chart
 from wildlab.reporting.charts.tracks import error_map, error_scatter, error_shares, errors_by_image
 from wildlab.reporting.figures import colour
-from wildlab.reporting.georeferencing_tables import (
-    SUMMARY,
-    axes_table,
-    beside_published,
-    errors_table,
-    groups_table,
-    models_table,
-    noise_table,
-    outliers_table,
-    parameters_table,
-    parts_table,
-    simplest_rivals,
-    worst_images,
-    worst_sightings,
-)
 from wildlab.reporting.notebook_pages import ADVICE
-from wildlab.reporting.published import load_published
 from wildlab.reporting.report import Report, Wording
 
 #: Fewer points than this say little about a flight.
@@ -65,6 +52,140 @@ MOST = 0.5
 MOST_ADVICE = 3
 #: Zones are whole quarters of an hour, s.
 ZONE_S = 900.0
+
+
+# -- tables
+
+#: Rows of the table of models, and of that of the worst images.
+SHOWN, MOST_IMAGES = 8, 10
+_NOISE = {
+    "position_horizontal": ("position_horizontal_m", "m"),
+    "position_vertical": ("position_vertical_m", "m"),
+    "tilt": ("tilt_deg", "deg"),
+    "heading": ("heading_deg", "deg"),
+    "pixel": ("pixel_px", "px"),
+}
+#: Fields of an error summary by the names of their metrics.
+SUMMARY = {
+    "horizontal_error_mean": "mean",
+    "horizontal_error_median": "median",
+    "horizontal_error_p90": "p90",
+    "horizontal_error_max": "max",
+    "bias_north": "bias_north",
+    "bias_east": "bias_east",
+    "sd_north": "sd_north",
+    "sd_east": "sd_east",
+}
+
+
+def errors_table(rows: Mapping[str, ErrorSummary]) -> pd.DataFrame:
+    """One row of errors for each summary, with its name in the column ``pose``."""
+    return pd.DataFrame([{"pose": name, **summary._asdict()} for name, summary in rows.items()])
+
+
+def groups_table(groups: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """One row of errors for each scored part of a flight, with images and ellipse coverage."""
+    return pd.DataFrame(
+        [
+            {
+                "part": name,
+                "images": rows["frame_id"].nunique(),
+                **summarise(errors_of(rows))._asdict(),
+                "inside": 100 * rows["inside_90"].mean(),
+            }
+            for name, rows in groups.items()
+        ]
+    )
+
+
+def worst_images(scored: pd.DataFrame) -> pd.DataFrame:
+    """The images with the largest mean error, `MOST_IMAGES` at most, numbered as on the map."""
+    each = scored.dropna(subset=["error_m"]).groupby("frame_id", sort=False)["error_m"]
+    found = each.agg(["count", "mean", "max"]).nlargest(MOST_IMAGES, "mean").reset_index(names="image")
+    return found.assign(number=np.arange(len(found)) + 1)
+
+
+def worst_sightings(flight: Flight, scored: pd.DataFrame) -> pd.DataFrame:
+    """The detection that is furthest off in each of the `worst_images`, with its pixel and a ``line``."""
+    worst = worst_images(scored)
+    furthest = scored.loc[scored.groupby("frame_id")["error_m"].idxmax().dropna()].set_index("frame_id")
+    pixels = flight.table("detections").set_index("detection_id")[["u_px", "v_px"]]
+    found = worst.join(furthest.loc[worst["image"]].join(pixels, on="detection_id"), on="image")
+    lines = [f"{n}: {length(m)}" for n, m in zip(found["number"], found["error_m"], strict=True)]
+    return found.assign(line=lines)
+
+
+def simplest_rivals(diagnosis: Diagnosis) -> list[int]:
+    """Numbers of the rivals that hold no other rival, the two of the least held-out error at most."""
+    models, winner = diagnosis.models, diagnosis.winner
+    rivals = [m for m in diagnosis.ranked.rivals if models[m].causes not in ((), winner.causes)]
+    held = [set(models[m].causes) for m in rivals]
+    simple = [m for m in rivals if not any(one < set(models[m].causes) for one in held)]
+    return sorted(simple, key=lambda m: models[m].gain.with_)[:2]
+
+
+def models_table(diagnosis: Diagnosis) -> pd.DataFrame:
+    """The most likely models, the winner bold, rivals that the page names, and the poses as logged."""
+    likeliest = np.argsort(diagnosis.ranked.scores, kind="stable")[:SHOWN].tolist()
+    rows = []
+    for m in dict.fromkeys([*likeliest, diagnosis.ranked.winner, *simplest_rivals(diagnosis), 0]):
+        model = diagnosis.models[m]
+        gain = model.gain.gain
+        rows.append(
+            {
+                "what": f"**{model.name}**" if m == diagnosis.ranked.winner else model.name,
+                "parameters": len(model.fit.names),
+                "error": model.gain.with_,
+                "gain": gain.estimate if model.causes else np.nan,
+                "low": gain.low if model.causes else np.nan,
+                "high": gain.high if model.causes else np.nan,
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def parameters_table(report: Report, calibration: Calibration) -> pd.DataFrame:
+    """Estimated corrections with their 95 % intervals, one row each; recorded as metrics too."""
+    names, rows = load_texts("georeferencing").quantities, []
+    for one in corrections(calibration):
+        name, value, low, high, unit = one.values()
+        metric = f"boresight_{name}" if name in BORESIGHT else f"{name}_offset"
+        report.metric(metric, "calibration", value, unit, n=calibration.n_images, low=low, high=high)
+        shown = {"what": names[name], "unit": "" if unit == "1" else unit, "zero": low <= 0 <= high}
+        rows.append(one | shown)
+    return pd.DataFrame(rows)
+
+
+def outliers_table(outliers: Sequence[Outlier]) -> pd.DataFrame:
+    """Marks, photos and clicks that are outliers, largest first."""
+    return pd.DataFrame(
+        [
+            {
+                "kind": one.kind,
+                "photo": one.photo or "several",
+                "mark": one.mark or ("several" if one.kind == "photo" else "not known"),
+                "points": one.points,
+                "error": one.off_m,
+            }
+            for one in outliers
+        ]
+    )
+
+
+def noise_table(noise: WanderNoise, assumed: Mapping[str, float]) -> pd.DataFrame:
+    """Assumed and estimated standard deviations, one row each, in degrees, metres and pixels."""
+    names = load_texts("georeferencing").quantities
+    return pd.DataFrame(
+        [
+            {
+                "what": names[kind],
+                "assumed": assumed[key],
+                "estimated": np.degrees(noise.sd[kind]) if unit == "deg" else noise.sd[kind],
+                "unit": unit,
+            }
+            for kind, (key, unit) in _NOISE.items()
+        ]
+    )
 
 
 # -- what is recorded
@@ -207,8 +328,8 @@ def cause_message(diagnosis: Diagnosis | None) -> Message:
     values = {
         "causes": words_of_causes(causes),
         "share": percent_of(share),
-        "without": short_length(winner.gain.without),
-        "with": short_length(winner.gain.with_),
+        "without": length(winner.gain.without),
+        "with": length(winner.gain.with_),
     }
     if not diagnosis.counts:
         simplest = [diagnosis.models[m].causes for m in simplest_rivals(diagnosis)]
@@ -229,8 +350,8 @@ def answer(found: Accuracy) -> list[Message]:
         "points": summary.n,
         "total": total,
         "lost": found.lost,
-        "median": short_length(summary.median),
-        "p90": short_length(summary.p90),
+        "median": length(summary.median),
+        "p90": length(summary.p90),
     }
     if not summary.n:
         return [Message("no-position", values)]
@@ -321,7 +442,7 @@ def advice(found: Accuracy, *, calibrated_elsewhere: bool, problems: int = 0) ->
     # What is far out may come of what contradicts itself, or of a constant error that is not certain.
     if first is not None and not problems and not possible_share(found.summary, diagnosis):
         name = first.mark if first.kind == "mark" else first.photo
-        values = {"kind": first.kind, "name": str(name), "error": short_length(first.off_m)}
+        values = {"kind": first.kind, "name": str(name), "error": length(first.off_m)}
         said.append(Message("advice-outlier", values))
     return said[:MOST_ADVICE]
 
@@ -350,8 +471,7 @@ def limits(
         ("limit-extended", diagnosis is not None and diagnosis.extended, {}),
         ("limit-lost", 0 < found.lost <= MANY_LOST * len(found.scored), {"lost": found.lost}),
         ("limit-clock-fitted", manifest.kind != "twin" and abs(rest) > 1e-6, {"offset": f"{rest:+.2f}"}),
-        ("limit-halves", bool(found.halves.disagree), {}),
-        ("limit-nearest", found.visible_m == found.visible_m, {"hidden": short_length(found.visible_m)}),
+        ("limit-nearest", found.visible_m == found.visible_m, {"hidden": length(found.visible_m)}),
         ("limit-track", "track" in truth, {"sd": measure(truth.get("track", np.nan), "m")}),
         ("limit-wander", diagnosis is not None and diagnosis.counts, {}),
         ("limit-unlabelled", bool(programs), {}),
@@ -365,11 +485,6 @@ def limits(
 
 
 # -- the page
-
-
-def short_length(metres: float) -> str:
-    """A length with its unit, in centimetres below a metre: ``5.1 m``, ``40 cm``."""
-    return measure(metres, "m") if not metres < 0.95 else measure(100 * metres, "cm")
 
 
 def span(values: Any) -> str:
@@ -469,10 +584,7 @@ def show_accuracy(
         rows |= _other_summaries(found, texts)
         rows |= {texts.subjects["recorded"].format(program): one for program, one in others.items()}
         wording.table("errors", errors_table(rows))
-        published = load_published(report.study)
-        if len(published) and others:
-            beside = beside_published(published, next(iter(others.values())), logged)
-            wording.table("published", beside)
+        report.published(texts.subjects["published"], texts.subjects, {})
     if diagnosis is not None:
         if corrections is not None and (diagnosis.counts or possible_share(logged, diagnosis)):
             wording.table("parameters" if diagnosis.counts else "parameters-possible", corrections)
@@ -487,9 +599,6 @@ def show_accuracy(
     if groups and logged.n:
         wording.table("groups", groups_table(groups))
     show_models(report, wording, diagnosis)
-    if diagnosis is not None:
-        wording.table("axes", axes_table(found.axes))
-    wording.table("parts", parts_table(found))
     if diagnosis is not None:
         wording.table("noise", noise_table(diagnosis.noise, found.assumed))
     report.method(texts.method)
@@ -525,13 +634,13 @@ def _subtitle(flight: Flight, found: Accuracy) -> str:
 def _tiles(found: Accuracy, texts: PageTexts) -> list[tuple[str, str]]:
     logged, diagnosis, names = found.summary, found.diagnosis, texts.subjects
     interval = found.intervals.get("horizontal_error_mean")
-    again = f" ({short_length(interval[0])} to {short_length(interval[1])})" if interval else ""
+    again = f" ({length(interval[0])} to {length(interval[1])})" if interval else ""
     shown = [
-        (short_length(logged.mean), names["tile-mean"] + again),
-        (short_length(logged.p90), names["tile-p90"]),
+        (length(logged.mean), names["tile-mean"] + again),
+        (length(logged.p90), names["tile-p90"]),
     ]
     if diagnosis is not None and diagnosis.counts:
-        shown.append((short_length(diagnosis.held_summary().mean), names["tile-corrected"]))
+        shown.append((length(diagnosis.held_summary().mean), names["tile-corrected"]))
     coverage = found.ellipses.coverage
     if np.isfinite(coverage.estimate):
         ends = (
@@ -596,7 +705,7 @@ def answer_repeats(found: Repeats) -> Message:
     if spread is None:
         return Message("none-twice", values)
     values |= {
-        "scatter": short_length(spread.sd),
+        "scatter": length(spread.sd),
         "sightings": spread.sightings,
         "things": spread.things,
         "ratio": significant(spread.consistent),
@@ -649,7 +758,7 @@ def show_repeats(report: Report, flight: Flight, found: Repeats, amiss: Sequence
         report.metric("sighting_consistency", "logged-pose", spread.consistent, "1", n=spread.sightings)
         report.tiles(
             [
-                (short_length(spread.sd), texts.subjects["tile-scatter"]),
+                (length(spread.sd), texts.subjects["tile-scatter"]),
                 (f"{spread.things} of {len(found.things)}", texts.subjects["tile-things"]),
                 (f"{found.lost} of {total}", texts.subjects["tile-lost"]),
             ]

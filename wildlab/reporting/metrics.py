@@ -25,79 +25,118 @@ from __future__ import annotations
 
 import json
 import math
-import re
+from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import FITTED, NO_PREMISE, SHARE_VERDICTS, UNDECIDABLE
 
 KINDS = ("logged", "twin", "computed")
 VERDICTS = (*SHARE_VERDICTS, NO_PREMISE, UNDECIDABLE, FITTED)
-
 #: The metric that tells by its subject which poses others were held against; its value is at how many times.
 AGAINST = "compared_with"
+#: What an earlier version wrote besides.
+_GONE = frozenset({"below"})
 
-_NAME = re.compile(r"[a-z][a-z0-9_]*")
-_SUBJECT = re.compile(r"\S+")
 
-
-def plain_number(value: Any, what: str) -> float | int | None:
-    """``value`` as a plain number; None and NaN become None.
-
-    Raises
-    ------
-    WildlabError
-        If it is infinite or not a number at all.
-    """
+def _plain(value: Any) -> float | int | None:
+    """A plain number; None and NaN become None."""
     if value is None:
         return None
     if isinstance(value, (bool, str)):
-        raise WildlabError(f"{what} is {value!r}", "give a number or None")
-    try:
-        number = float(value)
-    except (TypeError, ValueError) as error:
-        raise WildlabError(f"{what} is of type {type(value).__name__}", "give a number or None") from error
-    if math.isnan(number):
-        return None
+        raise ValueError("it is no number")
+    number = float(value)
     if math.isinf(number):
-        raise WildlabError(f"{what} is infinite", "give a number or None")
-    return int(number) if isinstance(value, int) else number
+        raise ValueError("it is infinite")
+    return None if math.isnan(number) else int(number) if isinstance(value, int) else number
 
 
-#: What an entry of ``metrics`` has besides name, subject, value and unit, and one of ``claims`` besides id,
-#: text and verdict; None where it is not given.
-_METRIC: dict[str, type] = {
-    "n": int,
-    "published": float,
-    "source": str,
-    **dict.fromkeys(("low", "high"), float),
-    "flights": int,
-    **dict.fromkeys(("centre_low", "centre_high", "power"), float),
-}
-_GONE = frozenset({"below"})
-_CLAIM: dict[str, type] = {
-    "fraction": float,
-    "seeds": int,
-    **dict.fromkeys(("low", "high"), float),
-    "met": int,
-    **dict.fromkeys(("half", "twice"), str),
-    **dict.fromkeys(("difference", "difference_low", "difference_high"), float),
-}
+def _known(verdict: str) -> str:
+    if verdict not in VERDICTS:
+        raise ValueError(f"it is none of: {', '.join(VERDICTS)}")
+    return verdict
 
 
-def _entry(kinds: dict[str, type], given: dict[str, Any], what: str) -> dict[str, Any]:
-    if unknown := set(given) - set(kinds):
-        raise TypeError(f"{what} has no {min(unknown)!r}")
-    return {
-        name: None
-        if given.get(name) is None
-        else plain_number(given[name], f"{name} of {what}")
-        if kind is float
-        else kind(given[name])
-        for name, kind in kinds.items()
-    }
+Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
+Subject = Annotated[str, Field(pattern=r"^\S+$")]
+Plain = Annotated[float | int | None, BeforeValidator(_plain)]
+Count = Annotated[int | None, BeforeValidator(lambda value: None if value is None else int(value))]
+Share = Annotated[Annotated[float, Field(ge=0, le=1)] | None, BeforeValidator(_plain)]
+VerdictWord = Annotated[str, BeforeValidator(_known)]
+
+
+class _Entry(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        low, high = getattr(self, "low", None), getattr(self, "high", None)
+        if low is not None and high is not None and low > high:
+            raise ValueError("its low bound is above the high one")
+        return self
+
+
+class _Metric(_Entry):
+    name: Name
+    subject: Subject
+    value: Plain
+    unit: str
+    n: Count = None
+    published: Plain = None
+    source: str | None = None
+    low: Plain = None
+    high: Plain = None
+    flights: Count = None
+    centre_low: Plain = None
+    centre_high: Plain = None
+    power: Plain = None
+
+
+class _Claim(_Entry):
+    id: Subject
+    text: str
+    verdict: VerdictWord
+    fraction: Share = None
+    seeds: Count = None
+    low: Share = None
+    high: Share = None
+    met: Count = None
+    half: VerdictWord | None = None
+    twice: VerdictWord | None = None
+    difference: Plain = None
+    difference_low: Plain = None
+    difference_high: Plain = None
+
+
+class _Document(_Entry):
+    study: str
+    flight: str
+    kind: Literal["logged", "twin", "computed"]
+    seed: Annotated[int, Field(ge=0, strict=True)] | None
+    seeds: Annotated[int, Field(ge=0, strict=True)] | None
+    metrics: list[dict[str, Any]]
+    claims: list[dict[str, Any]]
+
+    @model_validator(mode="after")
+    def _once(self) -> Self:
+        keys = [(one["name"], one["subject"]) for one in self.metrics] + [(one["id"],) for one in self.claims]
+        if several := [key for key, count in Counter(keys).items() if count > 1]:
+            raise ValueError(f"{' of '.join(several[0])} is given twice")
+        return self
+
+
+def _checked(model: type[_Entry], values: dict[str, Any], what: str) -> dict[str, Any]:
+    try:
+        return model(**values).model_dump()
+    except ValidationError as error:
+        first = error.errors()[0]
+        said = first["msg"].removeprefix("Value error, ")
+        where = f"{first['loc'][0]} {first['input']!r} of {what}" if first["loc"] else what
+        raise WildlabError(f"{where}: {said}", "mend what records it", field="metrics") from None
 
 
 def metric(name: str, subject: str, value: Any, unit: str, **more: Any) -> dict[str, Any]:
@@ -130,20 +169,8 @@ def metric(name: str, subject: str, value: Any, unit: str, **more: Any) -> dict[
     >>> metric("rmse", "kf", 1.25, "m")["value"]
     1.25
     """
-    if not isinstance(name, str) or not _NAME.fullmatch(name):
-        problem = f"the metric name {name!r} is not made of a-z, 0-9 and _"
-        raise WildlabError(problem, "rename it: tools read it", field="metrics")
-    if not isinstance(subject, str) or not _SUBJECT.fullmatch(subject):
-        problem = f"the subject {subject!r} of metric {name!r} is empty or has a blank"
-        raise WildlabError(problem, "join its parts with / or -", field="metrics")
-    what = f"{name} of {subject}"
-    value = plain_number(value, f"the value of {what}")
-    entry = {"name": name, "subject": subject, "value": value, "unit": str(unit)} | _entry(
-        _METRIC, more, what
-    )
-    if entry["low"] is not None and entry["high"] is not None and entry["low"] > entry["high"]:
-        raise WildlabError(f"the low bound of {what} is above the high one", "swap them", field="metrics")
-    return entry
+    given = {"name": name, "subject": subject, "value": value, "unit": unit, **more}
+    return _checked(_Metric, given, f"the metric {name!r} of {subject!r}")
 
 
 def claim(id: str, text: str, verdict: str, **more: Any) -> dict[str, Any]:
@@ -174,52 +201,18 @@ def claim(id: str, text: str, verdict: str, **more: Any) -> dict[str, Any]:
     >>> claim("better", "The filter is better.", "holds")["verdict"]
     'holds'
     """
-    if not isinstance(id, str) or not _SUBJECT.fullmatch(id):
-        raise WildlabError(f"the claim id {id!r} is empty or has a blank", "use letters, digits, - and _")
-    entry = _entry(_CLAIM, more, f"claim {id}")
-    for one in (verdict, *(entry[name] for name in ("half", "twice") if entry[name] is not None)):
-        if one not in VERDICTS:
-            raise WildlabError(
-                f"the verdict {one!r} of claim {id!r} is unknown", f"use one of: {', '.join(VERDICTS)}"
-            )
-    for name in ("fraction", "low", "high"):
-        if entry[name] is not None and not 0 <= entry[name] <= 1:
-            problem = f"the {name} of claim {id!r} is {entry[name]}"
-            raise WildlabError(problem, "give a share from 0 to 1")
-    return {"id": id, "text": str(text), "verdict": verdict} | entry
+    return _checked(_Claim, {"id": id, "text": text, "verdict": verdict, **more}, f"the claim {id!r}")
 
 
 def document(
-    *,
-    study: str,
-    flight: str,
-    kind: str,
-    seed: int | None,
-    seeds: int | None,
-    metrics: Iterable[dict[str, Any]],
-    claims: Iterable[dict[str, Any]],
+    *, metrics: Iterable[dict[str, Any]], claims: Iterable[dict[str, Any]], **about: Any
 ) -> dict[str, Any]:
-    """The whole content of ``metrics.json``; a name and subject, or a claim, that comes twice is an error."""
-    if kind not in KINDS:
-        raise WildlabError(f"the kind {kind!r} is unknown", f"use one of: {', '.join(KINDS)}", field="kind")
-    for field, number in (("seed", seed), ("seeds", seeds)):
-        if number is not None and (isinstance(number, bool) or not isinstance(number, int) or number < 0):
-            raise WildlabError(f"{field} is {number!r}", "give a whole number, or None", field=field)
-    metrics, claims = list(metrics), list(claims)
-    seen: set[tuple[str, ...]] = set()
-    for key in [(m["name"], m["subject"]) for m in metrics] + [(c["id"],) for c in claims]:
-        if key in seen:
-            raise WildlabError(f"{' of '.join(key)} is given twice", "give each number and claim once")
-        seen.add(key)
-    return {
-        "study": study,
-        "flight": flight,
-        "kind": kind,
-        "seed": seed,
-        "seeds": seeds,
-        "metrics": metrics,
-        "claims": claims,
-    }
+    """The whole content of ``metrics.json``; a name and subject, or a claim, that comes twice is an error.
+
+    ``about``: study, flight, kind, seed and seeds.
+    """
+    given = {**about, "metrics": list(metrics), "claims": list(claims)}
+    return _checked(_Document, given, f"the study {about.get('study')!r}")
 
 
 def read_metrics(path: Path) -> dict[str, Any]:
@@ -241,18 +234,11 @@ def read_metrics(path: Path) -> dict[str, Any]:
     """
     try:
         raw = json.loads(path.read_text(encoding="utf-8"), parse_constant=_no_constant)
-        return document(
-            study=str(raw["study"]),
-            flight=str(raw["flight"]),
-            kind=raw["kind"],
-            seed=raw["seed"],
-            seeds=raw["seeds"],
-            # What an earlier version wrote besides is of no use to this one.
-            metrics=[
-                metric(**{key: entry[key] for key in entry if key not in _GONE}) for entry in raw["metrics"]
-            ],
-            claims=[claim(**entry) for entry in raw["claims"]],
-        )
+        metrics = [
+            metric(**{key: entry[key] for key in entry if key not in _GONE}) for entry in raw["metrics"]
+        ]
+        claims = [claim(**entry) for entry in raw["claims"]]
+        return document(**{**raw, "metrics": metrics, "claims": claims})
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise WildlabError(
             f"this is not a metrics file ({type(error).__name__}: {error})", "run the study again", file=path

@@ -33,7 +33,7 @@ from wildlab.analysis.verdict import (
 )
 from wildlab.messages import quantities
 from wildlab.messages.catalogue import Message, load_texts
-from wildlab.messages.quantities import FORMS, metres, number, percent_of
+from wildlab.messages.quantities import metres, number, percent_of
 from wildlab.names import listed
 from wildlab.reporting.charts import flights as charts
 from wildlab.reporting.georeferencing import show_advice, show_contradictions, span, words_of_causes
@@ -41,6 +41,7 @@ from wildlab.reporting.report import Report, Wording
 
 #: Subject of what is recorded of the whole flight.
 FLIGHT = "flight"
+_MOTION = {"height": "height (m)", "speed": "speed (m/s)"}
 _UNITS = {"jumps": "m", "leans": "deg", "apart": "m", "shakes": "m/s^2"}
 
 
@@ -304,19 +305,6 @@ def streams_table(overview: Overview) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def satellites_table(overview: Overview) -> pd.DataFrame:
-    """What the receiver reports of its positions; maybe no rows."""
-    gnss, rows = overview.flight.gnss, []
-    names = load_texts("overview").quantities
-    columns = {"satellites": "satellites", "sd_horizontal_m": "sd-horizontal", "sd_vertical_m": "sd-vertical"}
-    for column, key in columns.items():
-        if gnss is not None and column in gnss and gnss[column].notna().any():
-            values = gnss[column].to_numpy(float)
-            worst = np.nanmin(values) if column == "satellites" else np.nanmax(values)
-            rows.append({"what": names[key], "median": float(np.nanmedian(values)), "worst": float(worst)})
-    return pd.DataFrame(rows, columns=["what", "median", "worst"])
-
-
 def coverage_table(overview: Overview) -> pd.DataFrame:
     """Images by whether they have a footprint on the ground, and why not; no rows without images."""
     coverage, names = overview.coverage, load_texts("overview").quantities
@@ -332,27 +320,6 @@ def coverage_table(overview: Overview) -> pd.DataFrame:
         "with-detections": overview.detections[1],
     }
     return pd.DataFrame([{"what": names[key], "images": count} for key, count in counts.items()])
-
-
-def clocks_table(overview: Overview, numbers: Numbers) -> pd.DataFrame:
-    """Offsets of the clocks: the given ones, and what is left of the camera's; no rows where none applies."""
-    manifest, tables = overview.flight.manifest, overview.flight.tables
-    left = numbers.get(("clock_offset", "calibration"))
-    given = [
-        ("camera", "frames", manifest.clocks.camera_offset_s),
-        ("truth", "truth", manifest.clocks.truth_offset_s),
-        ("satellite receiver", "gnss", manifest.clocks.gnss_offset_s - manifest.gnss.latency_s),
-    ]
-    rows = [
-        {
-            "clock": name,
-            "offset": offset,
-            "left": FORMS["range"](left) if left and name == "camera" else "not estimated",
-        }
-        for name, table, offset in given
-        if table in tables and manifest.time.kind == "utc"
-    ]
-    return pd.DataFrame(rows)
 
 
 # -- the page
@@ -434,14 +401,9 @@ def show_overview(
     record(report, overview, gains, counts)
     report.limits(wording.messages(limits(overview, lacking)))
     report.section("Details")
-    frames = {
-        "coverage": coverage_table(overview),
-        "streams": streams_table(overview) if overview.flight.manifest.time.kind == "utc" else pd.DataFrame(),
-        "satellites": satellites_table(overview),
-        "clocks": clocks_table(overview, numbers),
-    }
-    for key, frame in frames.items():
-        wording.table(key, frame)
+    wording.table("coverage", coverage_table(overview))
+    if overview.flight.manifest.time.kind == "utc":
+        wording.table("streams", streams_table(overview))
     report.method(wording.texts.method)
 
 
@@ -466,17 +428,15 @@ def _figures_over_time(overview: Overview, clock: charts.Clock) -> Iterator[tupl
     named = {name: pace for name, pace in overview.streams.items() if pace.n}
     if named and overview.flight.manifest.time.kind == "utc":
         yield "streams", charts.streams_chart(named, clock)
-    if not any(overview.series.values()):
-        return
-    if height := overview.series["height"]:
-        ground = None
-        if overview.above is not None and overview.path is not None:
-            ground = overview.path.times, -overview.path.place[:, 2] - overview.above[0]
-        yield "height", charts.lines_chart(height, clock, "height (m)", ground=ground)
-    if speed := overview.series["speed"]:
-        yield "speed", charts.lines_chart(speed, clock, "speed (m/s)", floor=True)
-    if attitude := overview.series["attitude"]:
-        yield "attitude", charts.attitude_chart(attitude, clock)
+    series, path = overview.series, overview.path
+    motion = {label: dict(series[key]) for key, label in _MOTION.items() if series.get(key)}
+    if overview.above is not None and path is not None and "height (m)" in motion:
+        motion["height (m)"]["ground"] = path.times, -path.place[:, 2] - overview.above[0]
+    attitude = series.get("attitude") or {}
+    for axis, label in enumerate(charts.ANGLES if attitude else ()):
+        motion[label] = {name: (times, angles[:, axis]) for name, (times, angles) in attitude.items()}
+    if motion:
+        yield "motion", charts.strips(motion, clock)
     if overview.vibration is not None:
         vibration, times = overview.vibration
         yield "shaking", charts.shaking_chart(vibration, times, clock)

@@ -1,9 +1,8 @@
-"""Published numbers and claims beside ours: how many of how many, tables, and all numbers at once as marks.
+"""Published numbers and claims beside ours: how many of how many, tables, and all numbers at once as dots.
 
-A mark lies on one axis, ours divided by the printed number, logarithmic. Whether a number is close is a
-shape; whether it is within the prediction interval of our flights is a colour, and a ring around what is
-outside, so that neither eyes nor printers that see no colour miss it. What was fitted is underlined. What has
-no ratio (a signed mean, a zero) or was not run is not drawn; whoever draws says how many.
+A dot lies on one axis, ours divided by the printed number, logarithmic; the shaded middle is close. It is
+green within the prediction interval of our flights, red and hollow outside. What has no ratio (a signed mean,
+a zero) or was not run is not drawn.
 """
 
 from __future__ import annotations
@@ -23,20 +22,18 @@ from wildlab.messages.quantities import NOTHING, number, unit_words
 from wildlab.names import listed
 from wildlab.reporting.published import (
     CALCULATED,
+    FIRST_LOOK,
     MANY,
     MEAN_OF_RUNS,
+    MISSING,
     ONE_FLIGHT,
     SHARE_OF_IMAGES,
-    quantity_kind,
-    spread_key,
-)
-from wildlab.reporting.status import (
-    FIRST_LOOK,
-    MISSING,
     Claim,
     Number,
     Standing,
     StudyStatus,
+    quantity_kind,
+    spread_key,
     standing,
 )
 from wildlab.reporting.text import dim, mark_up, pill, render, table
@@ -333,140 +330,57 @@ def caption_of(numbers: Sequence[Number]) -> str:
     return " ".join([*said, texts["signs"], fill(texts["sources"], {}, {"sources": sources})])
 
 
-#: Answers to "close?" in the order in which they are drawn, the last on top, and how each is drawn.
-SHAPES: dict[str, tuple[str, str]] = {
-    FIRST_LOOK: ("look", "M0-3.6 3.6 0 0 3.6-3.6 0Z"),
-    Closeness.NOT_JUDGED: ("none", "M-3-3H3V3H-3Z"),
-    Closeness.CANNOT_TELL: ("vague", "M0-3.2a3.2 3.2 0 1 1-.01 0Z"),
-    Closeness.NOT_CLOSE: ("off", "M-3.6-3.6 3.6 3.6M3.6-3.6-3.6 3.6"),
-    Closeness.CLOSE: ("same", "M0-3.6a3.6 3.6 0 1 1-.01 0Z"),
-}
-#: Around what is outside; below what is fitted.
-RING, UNDERLINE = "M0-5.4a5.4 5.4 0 1 1-.01 0Z", "M-4 6.4H4"
-#: What the axis says, by ratio.
+#: What the axis of marks says, by ratio; what lies beyond its ends is drawn at them.
 TICKS = {1 / 8: "⅛", 1 / 4: "¼", 1 / 2: "½", 1.0: "published", 2.0: "2×", 4.0: "4×", 8.0: "8×"}
 #: The margin of most published numbers, the size of an error; it is shaded.
 MARGIN = KINDS["error size"].factor
-#: Half of a mark, and how far its neighbours are, in units of the drawing.
-_HALF, _APART = 6.0, 8.6
-#: The width of their axis, in units.
-MARKS_WIDTH = 320.0
-#: Rows of marks on an axis at most; beyond that, marks overlap.
-MOST_LEVELS = 5
-
-
-class Mark(NamedTuple):
-    """A number drawn: where (units from the left, and from the middle down), both answers, whether it is
-    fitted, and whether the axis ends before it (-1 left, 1 right, 0 not)."""
-
-    x: float
-    y: float
-    closeness: str
-    compatibility: str
-    fitted: bool
-    beyond: int
+#: The axis of marks, and its room above and below, in units of the drawing.
+MARKS_WIDTH, MARKS_HEIGHT, _HALF = 320.0, 34.0, 6.0
 
 
 def drawable(numbers: Iterable[Number]) -> list[Number]:
-    """Those with a ratio and a shape."""
-    return [one for one in numbers if one.ratio is not None and one.ratio > 0 and one.answers[0] in SHAPES]
-
-
-def arrange_marks(numbers: Sequence[Number], levels: int) -> list[Mark]:
-    """Marks for numbers, beside one another where they would hide each other.
-
-    Parameters
-    ----------
-    numbers
-        From `drawable`.
-    levels
-        Rows of marks there is room for, an odd number; beyond that, marks overlap.
-
-    Returns
-    -------
-    list of Mark
-        In the order of `SHAPES`, and of the numbers.
-    """
-    middle_first = sorted(range(levels), key=lambda k: (abs(k - levels // 2), k))
-    taken: dict[int, list[float]] = {k: [] for k in range(levels)}
-    order = list(SHAPES)
-    marks = []
-    for one in sorted(numbers, key=lambda n: order.index(n.answers[0]), reverse=True):
-        ratio = one.ratio or 0.0  # `drawable` has left out those without
-        x = place(ratio, MARKS_WIDTH, _HALF)
-        crowd = {k: sum(abs(x - other) < _APART for other in taken[k]) for k in middle_first}
-        level = min(middle_first, key=lambda k: crowd[k])
-        taken[level].append(x)
-        beyond = 1 if ratio > WIDEST else -1 if ratio < 1 / WIDEST else 0
-        marks.append(Mark(x, (level - levels // 2) * _APART, *one.answers, bool(one.fitted), beyond))
-    return marks[::-1]
-
-
-def levels_for(numbers: Sequence[Number], most: int = MOST_LEVELS) -> int:
-    """Rows of marks that numbers need so that none hides another, odd, and at most so many."""
-    for levels in range(1, most, 2):
-        marks = arrange_marks(numbers, levels)
-        if all(abs(a.x - b.x) >= _APART or a.y != b.y for i, a in enumerate(marks) for b in marks[:i]):
-            return levels
-    return most
+    """Those with a ratio."""
+    return [one for one in numbers if one.ratio is not None and one.ratio > 0]
 
 
 def marks_plot(numbers: Iterable[Number], *, alt: str) -> Markup:
-    """Numbers as marks on the axis, an SVG element, and the axis in words below it.
+    """Numbers as dots on the axis, an SVG element, and the axis in words below it.
 
     Parameters
     ----------
     numbers
-        Those that cannot be drawn are left out.
+        Those that cannot be drawn are left out. Neighbours stand higher and lower, so that both are seen.
     alt
         What a reader who cannot see it should know.
     """
-    shown = drawable(numbers)
-    levels = levels_for(shown)
-    height = levels * _APART + 5
+
+    def at(ratio: float) -> float:
+        return place(ratio, MARKS_WIDTH, _HALF)
+
+    reach = MARKS_HEIGHT / 2 - _HALF
     return render(
         "marks",
         alt=alt,
         width=MARKS_WIDTH,
-        height=height,
-        axis=[("one" if ratio == 1 else "axis", place(ratio, MARKS_WIDTH, _HALF)) for ratio in TICKS],
+        height=MARKS_HEIGHT,
+        axis=[("one" if ratio == 1 else "axis", at(ratio)) for ratio in TICKS],
         ticks=[
-            (100 * place(ratio, MARKS_WIDTH, _HALF) / MARKS_WIDTH, one, ratio in (1 / 2, 2.0))
+            (100 * at(ratio) / MARKS_WIDTH, one, ratio in (1 / 2, 2.0))
             for ratio, one in TICKS.items()
             if ratio not in (1 / 4, 4.0)
         ],
-        near=(place(1 / MARGIN, MARKS_WIDTH, _HALF), place(MARGIN, MARKS_WIDTH, _HALF)),
+        near=(at(1 / MARGIN), at(MARGIN)),
         marks=[
-            (one, height / 2 + one.y, mark_symbol(one.closeness, one.compatibility, one.fitted))
-            for one in arrange_marks(shown, levels)
+            (at(one.ratio or 0.0), MARKS_HEIGHT / 2 + reach * (2 * (k * 0.618034 % 1) - 1), _mark(one))
+            for k, one in enumerate(drawable(numbers))
         ],
     )
 
 
-def mark_symbol(closeness: str, compatibility: str, fitted: bool) -> Markup:
-    """The shape of both answers about the origin, an SVG group."""
-    name, path = SHAPES[closeness]
-    state = compatibility if compatibility in ("within", "outside") else ""
-    # A calculation has no flights to be within: its one answer has the colour as well.
-    if compatibility == Compatibility.NOT_JUDGED and closeness != Closeness.NOT_JUDGED:
-        state = {Closeness.CLOSE: "within", Closeness.NOT_CLOSE: "outside"}.get(Closeness(closeness), "")
-    ring = RING if compatibility == Compatibility.OUTSIDE else ""
-    below = UNDERLINE if fitted else ""
-    return render("mark", state=state, name=name, path=path, ring=ring, below=below)
-
-
-def marks_legend(numbers: Iterable[Number]) -> Markup:
-    """What each symbol means, of those that occur among some numbers, and the shaded margin; as HTML."""
-    shown = drawable(numbers)
-    near, inside = ({one.answers[k] for one in shown} for k in (0, 1))
-    return render(
-        "legend",
-        key=[(mark_symbol(one, "", False), one) for one in reversed(SHAPES) if one in near],
-        within=mark_symbol(Closeness.CLOSE, Compatibility.WITHIN, False) if "within" in inside else "",
-        ring=RING if "outside" in inside else "",
-        underline=UNDERLINE if any(one.fitted for one in shown) else "",
-        close=MARGIN,
-    )
+def _mark(one: Number) -> str:
+    """The colour of a number's dot: within our flights or, where it has none to be within, close."""
+    near, inside = one.answers
+    return SIGNS.get(near if inside == Compatibility.NOT_JUDGED else inside, ("", ""))[1]
 
 
 def study_verdict(one: StudyStatus) -> Standing:

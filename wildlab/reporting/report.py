@@ -37,9 +37,15 @@ from wildlab.messages.quantities import known
 from wildlab.reporting import metrics as schema
 from wildlab.reporting.figures import figure_html, png_bytes, save_figure
 from wildlab.reporting.notebook_pages import ALERT, LIMITS, METHOD, VERDICT
-from wildlab.reporting.published import compared_number, judge, load_claims, published_rows
+from wildlab.reporting.published import (
+    Standing,
+    compared_number,
+    judge,
+    load_claims,
+    published_rows,
+    standing,
+)
 from wildlab.reporting.published_tables import LONGEST, caption_of, claims_table, published_table
-from wildlab.reporting.status import Standing, standing
 from wildlab.reporting.text import PILLS, TAGS, csv_link, escape, inline, prose, slug, table_html
 
 #: What is said where no number is known that anything could be said by.

@@ -41,8 +41,8 @@ ALIKE = 1.2
 NEAR_THE_BAND = 1.5
 #: Detections may fall this many times as far from where they are expected as predicted.
 SURPRISED = 1.5
-#: Targets by sensors that are drawn; the table has all. Times of restarts that are listed.
-MOST_DRAWN, MOST_TIMES = 4, 8
+#: Targets by sensors that are drawn; the table has all.
+MOST_DRAWN = 4
 _RECORDED = (
     # metric, column, unit, low, high, n
     ("rmse", "rmse", "m", None, None, "compared"),
@@ -324,36 +324,19 @@ def tracks_table(rows: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(shown)
 
 
-def restarts_table(followed: TrackingResult, rows: pd.DataFrame) -> pd.DataFrame:
+def restarts_table(rows: pd.DataFrame) -> pd.DataFrame:
     """A row for each target and sensor whose track ended and was reinitialised."""
-    found = []
-    for _, row in rows.drop_duplicates(["sensor", "target"]).iterrows():
-        if not row["restarts"]:
-            continue
-        key = (row["sensor"], row["target"])
-        one = next(one for one in followed.tracks if (one.sensor, one.target) == key)
-        times = [f"{t:.0f}" for t in one.times[one.starts[1:]]]
-        more = len(times) - MOST_TIMES
-        found.append(
+    again = rows[rows["restarts"] > 0].drop_duplicates(["sensor", "target"])
+    return pd.DataFrame(
+        [
             {
                 "track": f"{row['target']}, {row['sensor']}",
                 "anew": row["restarts"],
-                "when": ", ".join(times[:MOST_TIMES]) + (f" and {more} more" if more > 0 else ""),
                 "gone": f"{row['untracked']} of {row['spanned']}",
-                "seen": row["untracked_in_view"],
-                "ended": longest_gap(one.times, one.without),
             }
-        )
-    return pd.DataFrame(found)
-
-
-def longest_gap(times: np.ndarray, without: np.ndarray) -> float:
-    """The longest time without a track, s, of times (N,) and flags (N,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], without, [False]]).astype(int)))
-    if not len(edges):
-        return 0.0
-    begins, ends = edges[::2], np.minimum(edges[1::2], len(times) - 1)
-    return float((times[ends] - times[begins]).max())
+            for _, row in again.iterrows()
+        ]
+    )
 
 
 def apart_table(pairs: Sequence[SensorPair]) -> pd.DataFrame:
@@ -453,7 +436,7 @@ def show_tracks(
         limits.append("at-rest")
     report.limits(wording.messages(Message(f"limit-{one}") for one in limits))
     report.section("Details")
-    wording.table("restarts", restarts_table(followed, rows))
+    wording.table("restarts", restarts_table(rows))
     wording.table("apart", apart_table(pairs))
     flights = {"tuned": tuned.flight if tuned is not None else "no other flight"}
     wording.table("parameters", parameters_table(followed.given), count_assumed(followed.given) | flights)

@@ -1,27 +1,42 @@
-"""Reports on one flight of whoever asks: a report for each thing that its data can be judged by."""
+"""Reports on flights of whoever asks: one for each thing that a flight can be judged by, the tracks of its
+targets, and several flights on one page.
+
+Parameters of the notebooks are texts, not paths, and name no folder.
+"""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import nullcontext
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from rich.console import Console
 
 from wildlab.analysis.navigate import imu_noise, reference_of
-from wildlab.analysis.tracks.tracker import refuse_unusable
+from wildlab.analysis.tracks.many import refuse_unfit as refuse_unfit_settings
+from wildlab.analysis.tracks.noise_model import Against, settings_of
+from wildlab.analysis.tracks.scans import sensors_of
+from wildlab.analysis.tracks.tracker import refuse_unusable, sensors_with_detections
+from wildlab.analysis.tracks.tuning import refuse_same, tune_flight, tuned_text
 from wildlab.errors import WildlabError
+from wildlab.files import write_atomic, write_csv
 from wildlab.flight.calibration_files import calibration_toml, read_learnt, refuse_other_camera
 from wildlab.flight.checks.check import Use, find, usable_for
+from wildlab.flight.files import dump_toml, flight_name
+from wildlab.flight.manifest import FILE_NAME, Settings, read_manifest, read_settings
 from wildlab.flight.store import Flight, load_flight
 from wildlab.paths import NOTEBOOKS, REPORTS
+from wildlab.reporting.front_page import OwnFlight
 from wildlab.runner.catalogue import StudyEntry, load_studies
 from wildlab.runner.job import Job, other_reports, typed_in_report
-from wildlab.runner.ledger import own_flights
+from wildlab.runner.ledger import COMPARISON, build_ledger, finished_metrics, own_flights
+from wildlab.runner.progress import shown
 from wildlab.runner.provenance import provenance_of_flight, read_provenance
 from wildlab.runner.run import make_job, run_all
-from wildlab.runner.scheduling import Outcome
+from wildlab.runner.scheduling import Outcome, run_jobs
+from wildlab.runner.status import read_status
 
 #: Files of a flight that two flights may have in common.
 _SHARED = ("flight", "truth", "terrain", "calibration")
@@ -258,3 +273,299 @@ def lacking_for_navigation(flight: Flight, use: Use) -> str:
     except WildlabError as error:
         return str(error).rstrip(".")
     return ""
+
+
+#: The notebook on all targets at once.
+MANY_NOTEBOOK = "tracking-many.ipynb"
+
+
+def refuse_unfit(options: Mapping[str, object]) -> None:
+    """Refuse options that have no meaning where all targets are followed at once.
+
+    Raises
+    ------
+    WildlabError
+        For the first that was given.
+    """
+    for name, value in options.items():
+        if value:
+            raise WildlabError(
+                f"{name} and --many do not go together",
+                f"leave {name} out, or --many: with it all targets are followed by one filter, as told by "
+                "--settings",
+                field=name,
+            )
+
+
+def track_flight(
+    folder: Path,
+    *,
+    tune: Path | None = None,
+    against: str | None = None,
+    filters: Sequence[str] = (),
+    targets: Sequence[str] = (),
+    sensors: Sequence[str] = (),
+    settings: Path | None = None,
+    smooth: bool = False,
+    source: str | None = None,
+    **places: Any,
+) -> Outcome:
+    """Follow a flight's targets, and leave a report with tables of estimates.
+
+    Parameters
+    ----------
+    tune
+        Another flight folder, on which sensors are tuned.
+    against
+        ``"truth"`` or ``"innovations"``: how it is tuned; truth where there is any, if left out.
+    filters, targets, sensors, source
+        As `wildlab.analysis.tracks.tracker.track`.
+    settings
+        A settings file.
+    **places
+        As of `_run_report`.
+
+    Returns
+    -------
+    Outcome
+
+    Raises
+    ------
+    WildlabError
+        Where the flight cannot be followed as it is asked for, before anything runs.
+    """
+    flight = load_flight(folder)
+    stated = None if settings is None else read_settings(settings)
+    if against is not None and tune is None:
+        raise WildlabError(
+            "it is not said on which flight to tune",
+            "add --tune, or leave --against out",
+            field="--against",
+        )
+    refuse_unusable(flight, stated, filters, targets, sensors, source)
+    tuned = ""
+    if tune is not None:
+        other = load_flight(tune)
+        refuse_same(flight, other)
+        wanted = sensors_with_detections(flight, sensors)
+        there = set(sensors_with_detections(other))
+        if missing := [name for name in wanted if name not in there]:
+            raise WildlabError(
+                f"the flight {other.name!r} has no detections of the sensor {missing[0]!r}",
+                "name the sensors of both with --sensor",
+                file=tune,
+                field="--tune",
+            )
+        its_source = source if source in other.nav else None
+        tuned = tuned_text(tune_flight(other, wanted, stated, cast(Against | None, against), its_source))
+    parameters: dict[str, Any] = {
+        "settings": _text_of(stated),
+        "tuned": tuned,
+        "filters": list(filters),
+        "targets": list(targets),
+        "sensors": list(sensors),
+        "source": source or "",
+        "smooth": smooth,
+    }
+    title = f"Tracks of {flight.name}"
+    study = StudyEntry(name="evaluate", title=title, notebook="tracking.ipynb", parameters=parameters)
+    options: dict[str, Any] = {
+        "tune": tune,
+        "against": against,
+        "filter": filters,
+        "target": targets,
+        "sensor": sensors,
+        "settings": settings,
+        "smooth": smooth,
+        "source": source,
+    }
+    return _run_report(flight, study, "tracking", options, **places)
+
+
+def track_many(
+    folder: Path,
+    *,
+    sensors: Sequence[str] = (),
+    settings: Path | None = None,
+    source: str | None = None,
+    console: Console | None = None,
+    **places: Any,
+) -> Outcome:
+    """Follow all targets of a flight at once, and leave a report with a table of tracks.
+
+    Parameters
+    ----------
+    sensors, source
+        As `wildlab.analysis.tracks.tracker.track`.
+    settings
+        A settings file.
+    console, **places
+        As of `_run_report`.
+
+    Raises
+    ------
+    WildlabError
+        Where the flight cannot be followed as it is asked for, before anything runs.
+    """
+    flight = load_flight(folder)
+    stated = None if settings is None else read_settings(settings)
+    refuse_unusable(flight, stated, (), (), sensors, source)
+    told = settings_of(flight, stated)
+    refuse_unfit_settings(told)
+    unknown = ", ".join(map(repr, sorted(set(told.sensors) - set(sensors_of(flight)))))
+    if unknown and console is not None:
+        text = f"note: the settings speak of {unknown}, which this flight does not have."
+        console.print(text, markup=False, highlight=False)
+    parameters = {"settings": _text_of(stated), "sensors": list(sensors), "source": source or ""}
+    title = f"All targets of {flight.name}"
+    study = StudyEntry(name="evaluate", title=title, notebook=MANY_NOTEBOOK, parameters=parameters)
+    options = {"many": True, "sensor": sensors, "settings": settings, "source": source}
+    return _run_report(flight, study, "many", options, console=console, **places)
+
+
+def _text_of(settings: Settings | None) -> str:
+    return "" if settings is None else dump_toml(settings.model_dump(exclude_none=True))
+
+
+def _run_report(
+    flight: Flight,
+    study: StudyEntry,
+    kind: str,
+    options: dict[str, Any],
+    *,
+    into: Path | None = None,
+    reports: Path = REPORTS,
+    notebooks: Path = NOTEBOOKS,
+    console: Console | None = None,
+) -> Outcome:
+    """Run a notebook on a flight.
+
+    Parameters
+    ----------
+    options
+        Of the command, by name: they are written into the report, to be typed again.
+    into
+        The folder of the report, which then is in no list of others; left out, it is ``<kind>`` after the
+        flight's name, in ``reports``.
+    console
+        Where progress is shown.
+
+    Raises
+    ------
+    WildlabError
+        Where a study or another flight has its report there.
+    """
+    source = options["source"]
+    tell_source(flight, source, console)
+    studies = load_studies(notebooks / "studies.toml")
+    place = into or reports / f"{flight.name}-{kind}"
+    if into is None:
+        refuse_study_name(flight, place.name, studies)
+    folder = cast(Path, flight.folder)
+    refuse_other_flight(folder, place)
+    place.parent.mkdir(parents=True, exist_ok=True)
+    again = typed_in_report(
+        "wildlab track", folder, **options, out=into or (other_reports(reports) and place)
+    )
+    job = make_job(
+        study, flight=folder, reports=place.parent, notebooks=notebooks, name=place.name, again=again
+    )
+    return run_alone(job, studies, place.parent, console, listed=into is None)
+
+
+def run_alone(
+    job: Job, studies: dict[str, StudyEntry], reports: Path, console: Console | None, *, listed: bool
+) -> Outcome:
+    """Run one report; where it is not ``listed``, its folder is one's own and gets no list of others."""
+    if listed:
+        return run_all([[job]], [], studies, reports, console)[0]
+    with shown(console) if console is not None else nullcontext() as listen:
+        return run_jobs([job], listen=listen)[0]
+
+
+def compare_flights(
+    folders: Sequence[Path],
+    *,
+    into: Path | None = None,
+    reports: Path = REPORTS,
+    console: Console | None = None,
+) -> Path:
+    """Write one page, and one table with a row for each flight.
+
+    Parameters
+    ----------
+    folders
+        Two or more, of flights or of reports on them. A flight whose overview is not that of its files as
+        they are is evaluated first.
+    into
+        The folder to write to; left out, ``<reports>/comparison``.
+    reports
+        Where reports are, and go.
+    console
+        Where progress is shown.
+
+    Returns
+    -------
+    Path
+        Of the page.
+
+    Raises
+    ------
+    WildlabError
+        Where there are fewer than two flights, one is named twice, a folder is neither a flight nor a report,
+        or a flight cannot be evaluated.
+    """
+    if len(folders) < 2:
+        raise WildlabError("there is nothing to compare: one flight was named", "name two flights or more")
+    studies = load_studies()
+    for folder in folders:
+        if not (folder / FILE_NAME).is_file() and not (folder / "status.json").is_file():
+            raise WildlabError(
+                "this is neither a flight nor a report on one",
+                "name folders with a flight.toml, or of reports",
+                file=folder,
+            )
+    chosen: list[OwnFlight] = []
+    for folder in folders:
+        if (folder / FILE_NAME).is_file():
+            name, where = flight_name(folder, read_manifest(folder / FILE_NAME).name), reports
+            if not _is_current(folder, reports / f"{name}-overview"):
+                evaluate_flight(folder, reports=reports, console=console)
+        else:
+            status = read_status(folder)
+            if status.get("state") == "damaged":
+                raise WildlabError(str(status["reason"]), "make the report again", file=folder)
+            where = folder.resolve().parent
+            flight = read_provenance(folder).get("flight")
+            name = str(flight.get("name")) if isinstance(flight, dict) else ""
+        found = next((one for one in own_flights(where, studies) if one.name == name), None)
+        if found is None:
+            raise WildlabError(
+                "there is no report of a flight in this folder", "evaluate it: wildlab evaluate", file=folder
+            )
+        if found.name in [one.name for one in chosen]:
+            raise WildlabError(
+                f"the flight {found.name!r} is named twice", "name each flight once", file=folder
+            )
+        chosen.append(found)
+        damaged = [one.folder for one in found.reports if one.state == "damaged"]
+        if damaged and console is not None:
+            what = f"left out, not as written: {', '.join(damaged)} (see: wildlab verify)"
+            console.print(what, markup=False, highlight=False, soft_wrap=True)
+    target = reports / COMPARISON if into is None else into
+    target.mkdir(parents=True, exist_ok=True)
+    from wildlab.reporting.comparison import comparison_page, flights_table  # draws, which takes a while
+
+    page = comparison_page(chosen)
+    write_csv(target / "flights.csv", flights_table(chosen))
+    write_atomic(target / "report.html", page)
+    build_ledger(reports, studies)
+    return target / "report.html"
+
+
+def _is_current(folder: Path, overview: Path) -> bool:
+    """Whether an overview is done, and of the flight's files as they are."""
+    theirs = read_provenance(overview).get("flight")
+    if finished_metrics(overview) is None or not isinstance(theirs, dict):
+        return False
+    return bool(theirs.get("files") == provenance_of_flight(folder)["files"])

@@ -29,7 +29,7 @@ from wildlab.reporting.front_page import (
 )
 from wildlab.reporting.metrics import read_metrics
 from wildlab.reporting.notebook_pages import read_notebook
-from wildlab.reporting.status import load_cases
+from wildlab.reporting.published import load_cases
 from wildlab.reporting.text import escape
 from wildlab.runner.catalogue import StudyEntry
 from wildlab.runner.provenance import git_state, provenance_of_flight, read_provenance, tables_of

@@ -26,13 +26,12 @@ from wildlab.messages.catalogue import PageTexts, load_texts
 from wildlab.paths import REPORTS
 from wildlab.reporting.report import Report, open_report
 from wildlab.runner import vary
-from wildlab.runner.catalogue import StudyEntry, find_study, load_studies
-from wildlab.runner.flights import flights_for
+from wildlab.runner.catalogue import StudyEntry, find_study, flights_for, load_studies
+from wildlab.runner.scheduling import compute_seeds
 from wildlab.runner.seeds import (
     make_work,
     read_seed,
 )
-from wildlab.runner.worker_pool import compute_seeds
 from wildlab.studies.page import Shown, record_spread, show_page, show_twins
 from wildlab.studies.protocol import Study, find_case, split_keys
 

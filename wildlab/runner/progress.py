@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from typing import Any
 
 from rich.console import Console
@@ -64,55 +63,25 @@ def shown(console: Console) -> Iterator[Callable[[str, str, Any], None]]:
         *columns, console=console, transient=True, expand=True, speed_estimate_period=600
     ) as progress:
         task = progress.add_task("", total=0)
-        tally = Tally()
+        steps: dict[str, str] = {}
 
         def tell(name: str, event: str, what: Any) -> None:
-            tally.note(name, event, what)
-            progress.update(task, completed=tally.completed, total=tally.total, description=tally.now())
-            if event == "end":
+            if event == "plan":
+                progress.update(task, total=what)
+            elif event == "end":
+                steps.pop(name, None)
                 progress.console.print(outcome_line(what), highlight=False, soft_wrap=True)
+            elif event in ("seed", "cell"):
+                steps[name] = f"{event} {what[0] + (event == 'cell')} of {what[1]}"
+                progress.advance(task)
+            elif event == "stage":
+                steps[name] = _STAGES[what[0]]
+            elif event in ("start", "note"):
+                steps[name] = escape(what or "")
+            now = " · ".join(f"[bold]{escape(one)}[/] {step}" for one, step in steps.items())
+            progress.update(task, description=now)
 
         yield tell
-
-
-@dataclass
-class Tally:
-    """How many seeds and cells are done, and what is under way, from what the listener is told."""
-
-    total: int = 0
-    #: Of each study, by name.
-    seeds: dict[str, int] = field(default_factory=dict)
-    cells: dict[str, int] = field(default_factory=dict)
-    steps: dict[str, str] = field(default_factory=dict)
-
-    @property
-    def completed(self) -> int:
-        return sum(self.seeds.values()) + sum(self.cells.values())
-
-    def note(self, name: str, event: str, what: Any) -> None:
-        """One event: see `wildlab.runner.scheduling.Listener`."""
-        if event == "plan":
-            self.total = what
-        elif event == "start":
-            self.steps[name] = ""
-        elif event == "seed":
-            self.seeds[name], count = what
-            self.steps[name] = f"seed {what[0]} of {count}"
-        elif event == "note" and name in self.steps:
-            self.steps[name] = escape(what)
-        elif event == "stage":
-            self.steps[name] = _STAGES.get(what[0], str(what[0]))
-            if what[0] == "page":
-                self.cells[name] = self.cells.get(name, -1) + 1
-        elif event == "cell":
-            self.cells[name], count = what
-            self.steps[name] = f"cell {what[0] + 1} of {count}"
-        elif event == "end":
-            del self.steps[name]
-
-    def now(self) -> str:
-        """What is under way, with rich's markup."""
-        return " · ".join(f"[bold]{escape(name)}[/] {step}" for name, step in self.steps.items())
 
 
 def _in_lines(console: Console) -> Callable[[str, str, Any], None]:

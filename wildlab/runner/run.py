@@ -30,6 +30,7 @@ from wildlab.runner.catalogue import (
     STANDARD_PARAMETERS,
     StudyEntry,
     check_notebook,
+    dataset_source,
     find_studies,
     load_studies,
 )
@@ -318,8 +319,6 @@ def _flight_name(folder: Path) -> str:
 
 
 def _absent_data(study: StudyEntry) -> WildlabError | None:
-    from wildlab.runner.flights import dataset_source
-
     if study.dataset is None:
         return None
     try:

@@ -2,25 +2,38 @@
 
 A notebook starts once its seeds are there. One that is ready goes before further seeds, and a process that
 has computed seeds ends where a notebook needs its place.
+
+Seeds may be computed by a cluster of `dask.distributed` (the extra ``cluster``), whose every worker needs the
+same wildlab and the same environment; whether it has them is looked at before it computes. It sends numbers
+and nothing else, and this process puts them into the same store. A worker that is lost costs its seeds under
+way, which another one computes again.
 """
 
 from __future__ import annotations
 
+import re
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from multiprocessing import connection
-from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
-from wildlab.runner.job import Failure, Job, clear, install, leave_failure, log_of, sweep
-from wildlab.runner.notebook_process import run_notebook
-from wildlab.runner.processes import end_tree, start_process
-from wildlab.runner.seeds import failed_seeds, missing_seeds, sweep_seeds
-from wildlab.runner.worker_pool import Cluster, WorkerPool
+from wildlab.errors import RunFailed, WildlabError
+from wildlab.runner.job import Failure, Job, clear, install, leave_failure, log_of, run_notebook, sweep
+from wildlab.runner.processes import Child
+from wildlab.runner.seeds import (
+    SeedWork,
+    answer,
+    failed_seeds,
+    missing_seeds,
+    serve,
+    sweep_seeds,
+    write_seed,
+)
 
 
 @dataclass(frozen=True)
@@ -41,17 +54,25 @@ Listener = Callable[[str, str, Any], None]
 
 
 @dataclass
-class _Waiting:
-    """A study whose notebook has not started yet."""
+class _Study:
+    """A study on its way: its seeds, then its notebook, if it has one."""
 
-    job: Job
+    name: str
+    work: SeedWork | None
+    job: Job | None = None
     #: Seeds not handed out yet; how many are under way; how many there were.
-    seeds: deque[int]
+    seeds: deque[int] = field(default_factory=deque)
     under_way: int = 0
     count: int = 0
     failures: list[tuple[int, Failure]] = field(default_factory=list)
+    #: When it began, its seeds included; the notebook's cell under way.
     started: float | None = None
     began: str = ""
+    cell: int | None = None
+
+    def __post_init__(self) -> None:
+        self.seeds.extend([] if self.work is None else missing_seeds(self.work))
+        self.count = len(self.seeds)
 
     @property
     def ready(self) -> bool:
@@ -61,9 +82,9 @@ class _Waiting:
         """Note the time of its first step."""
         if self.started is None:
             self.started, self.began = time.monotonic(), _now()
-            tell(self.job.name, "start", None)
-            if self.job.seeds is not None:
-                tell(self.job.name, "seeds", (self.count, len(self.job.seeds.seeds)))
+            tell(self.name, "start", None)
+            if self.work is not None:
+                tell(self.name, "seeds", (self.count, len(self.work.seeds)))
 
 
 def run_jobs(
@@ -92,217 +113,318 @@ def run_jobs(
     for folder in {Path(job.reports) for job in jobs}:
         folder.mkdir(parents=True, exist_ok=True)
         sweep(folder)
-    waiting = [_waiting(job) for job in jobs]
-    tell("", "plan", sum(one.count + one.job.cells for one in waiting))
+    waiting = [_Study(job.name, job.seeds, job) for job in jobs]
+    tell("", "plan", sum(one.count + job.cells for one, job in zip(waiting, jobs, strict=True)))
     patience_s = max((job.timeout_s for job in jobs), default=0.0)
-    with WorkerPool() if scheduler is None else Cluster(scheduler, timeout_s=patience_s) as pool:
-        outcomes = _Scheduler(waiting, pool, max(1, parallel), tell).run()
+    with nullcontext() if scheduler is None else Cluster(scheduler, timeout_s=patience_s) as cluster:
+        outcomes = _Scheduler(waiting, cluster, max(1, parallel), tell).run()
     return [outcomes[job.name] for job in jobs]
 
 
-def _waiting(job: Job) -> _Waiting:
-    if job.seeds is None:
-        return _Waiting(job, deque())
-    missing = missing_seeds(job.seeds)
-    return _Waiting(job, deque(missing), count=len(missing))
+def compute_seeds(
+    works: Sequence[SeedWork], parallel: int, tell: Callable[[int, int], object]
+) -> dict[str, str]:
+    """Compute the seeds that are missing.
+
+    Parameters
+    ----------
+    parallel
+        How many processes.
+    tell
+        Called with how many seeds are done, of how many.
+
+    Returns
+    -------
+    dict
+        By the work's study why it failed: one flight that cannot be computed is enough.
+    """
+    waiting = [_Study(work.study, work) for work in works]
+    total, over = sum(one.count for one in waiting), 0
+
+    def listen(_: str, event: str, __: Any) -> None:
+        nonlocal over
+        if event == "seed":
+            over += 1
+            tell(over, total)
+
+    _Scheduler(list(waiting), None, parallel, listen).run()
+    return {one.name: _reason(one) for one in waiting if one.failures}
 
 
 @dataclass
 class _Scheduler:
-    waiting: list[_Waiting]
-    pool: WorkerPool | Cluster
+    waiting: list[_Study]
+    cluster: Cluster | None
     parallel: int
     tell: Listener
-    running: list[_Running] = field(default_factory=list)
+    #: Of this machine: those that compute seeds, or wait for more, and notebooks.
+    children: list[Child] = field(default_factory=list)
     outcomes: dict[str, Outcome] = field(default_factory=dict)
     #: Cases of which a seed has been computed here.
     known: set[str] = field(default_factory=set)
 
     def run(self) -> dict[str, Outcome]:
         try:
-            while self.waiting or self.running:
+            while self.waiting or self.busy:
                 self.start_notebooks()
                 self.hand_out_seeds()
-                connection.wait([*(one.pipe for one in self.running), *self.pool.pipes], timeout=0.25)
-                self.collect_seeds()
-                self.collect_notebooks()
+                connection.wait([child.pipe for child in self.busy], timeout=0.25)
+                self.collect()
         finally:
-            for one in self.running:
-                one.end()
-                clear(one.job)
+            for child in self.children:
+                child.end()
+                if child.doing is not None and child.doing[1] is None:
+                    clear(child.doing[0].job)
         return self.outcomes
+
+    @property
+    def busy(self) -> list[Child]:
+        return [child for child in self.children if child.doing is not None]
 
     @property
     def room(self) -> int:
         """How many more processes may be started."""
-        return self.parallel - len(self.running) - self.pool.size
+        return self.parallel - len(self.children)
 
     def start_notebooks(self) -> None:
         for one in [one for one in self.waiting if one.ready]:
-            one.start(self.tell)
-            if one.failures:
-                self.waiting.remove(one)
-                self.end(one.job, _finish_without_notebook(one))
-                continue
-            if self.room < 1:
-                self.pool.shutdown(1)
-            if self.room < 1:
-                return
+            if one.job is not None and not one.failures:
+                if self.room < 1:
+                    self.dismiss(1)
+                if self.room < 1:
+                    return
             self.waiting.remove(one)
-            self.running.append(_start(one))
+            if one.job is None:
+                continue
+            one.start(self.tell)
+            clear(one.job)
+            Path(one.job.work).mkdir(parents=True)
+            if one.failures:
+                # Those that did not fail are kept.
+                details = min(one.failures, key=lambda failed: failed[0])[1].details
+                reason = _reason(one)
+                self.end(one, one.job, Failure(f"{reason[:1].upper()}{reason[1:]}.", "", details))
+                continue
+            child = Child(f"wildlab {one.name}", run_notebook, one.job)
+            child.do((one, None), one.job.timeout_s)
+            self.children.append(child)
 
     def hand_out_seeds(self) -> None:
         if any(one.ready for one in self.waiting):
             return
         for one in self.waiting:
-            while one.seeds and one.job.seeds is not None and self.pool.places(self.room):
-                if self.compiling(one.job.seeds.case):
-                    break
+            while one.seeds and one.work is not None and not self.compiling(one.work.case):
+                if not self.submit(one, one.work, one.seeds[0]):
+                    return
                 one.start(self.tell)
-                self.pool.submit(one.job.seeds, one.seeds[0], one.job.timeout_s)
                 one.seeds.popleft()
                 one.under_way += 1
         if not any(one.seeds for one in self.waiting):
-            self.pool.shutdown(self.pool.size)
+            self.dismiss(len(self.children))
+
+    def submit(self, one: _Study, work: SeedWork, seed: int) -> bool:
+        """Hand a seed to the cluster, to an idle process or a new one; False where there is no room."""
+        given = (work.case, seed, work.parameters, work.code)
+        if self.cluster is not None:
+            self.cluster.submit((one, seed), given)
+            return True
+        idle = next((child for child in self.children if child.doing is None), None)
+        if idle is None:
+            if self.room < 1:
+                return False
+            idle = Child("wildlab seeds", serve)
+            self.children.append(idle)
+        idle.do((one, seed), float("inf") if one.job is None else one.job.timeout_s, given)
+        return True
+
+    def dismiss(self, count: int) -> None:
+        """End so many processes at most, of those that have nothing to do."""
+        for child in [child for child in self.children if child.doing is None][:count]:
+            self.children.remove(child)
+            child.end()
 
     def compiling(self, case: str) -> bool:
         """Whether the first seed of a case is under way: what its process compiles on first use of this
         machine, the others shall find compiled."""
-        under_way = {one.job.seeds.case for one in self.waiting if one.under_way and one.job.seeds}
-        return isinstance(self.pool, WorkerPool) and case in under_way - self.known
+        under_way = {one.work.case for one in self.waiting if one.under_way and one.work}
+        return self.cluster is None and case in under_way - self.known
 
-    def collect_seeds(self) -> None:
-        by_name = {one.job.name: one for one in self.waiting}
-        for result in self.pool.collect():
-            one = by_name[result.study]
-            one.under_way -= 1
-            if one.job.seeds is not None:
-                self.known.add(one.job.seeds.case)
-            if result.failure is not None:
-                one.failures.append((result.seed, result.failure))
-            self.tell(one.job.name, "seed", (one.count - len(one.seeds) - one.under_way, one.count))
-        for name, text in self.pool.notes():
-            self.tell(name, "note", text)
+    def collect(self) -> None:
+        for child in self.busy:
+            while child.doing is not None and (said := child.hear()) is not None:
+                self.take(child, *said)
+        if self.cluster is not None:
+            for (one, seed), said in self.cluster.collect():
+                self.take_seed(one, seed, *said)
 
-    def collect_notebooks(self) -> None:
-        for one in list(self.running):
-            if one.over(self.tell):
-                self.running.remove(one)
-                self.end(one.job, _finish(one.job, one.failure, one.cell, one.started, one.began))
+    def take(self, child: Child, kind: str, content: Any) -> None:
+        """What a process says."""
+        one, seed = child.doing
+        if kind not in ("done", "failed", "lost"):
+            one.cell = content[0] if kind == "cell" else one.cell
+            self.tell(one.name, kind, content)
+            return
+        child.doing = None
+        if kind == "lost" or seed is None:
+            self.children.remove(child)
+            child.end(0.0 if kind == "lost" else 3.0)
+        if kind == "lost":
+            content = Failure(content, "", log_of(one.job) if seed is None else "")
+        if seed is not None:
+            self.take_seed(one, seed, kind, content)
+        else:
+            self.end(one, one.job, content)
 
-    def end(self, job: Job, outcome: Outcome) -> None:
+    def take_seed(self, one: _Study, seed: int, kind: str, content: Any) -> None:
+        """A seed that is over: its numbers go into the store."""
+        assert one.work is not None  # noqa: S101 - for the type checker
+        one.under_way -= 1
+        self.known.add(one.work.case)
+        if kind == "done":
+            write_seed(one.work, seed, content)
+        else:
+            one.failures.append((seed, Failure(*content)))
+        self.tell(one.name, "seed", (one.count - len(one.seeds) - one.under_way, one.count))
+
+    def end(self, one: _Study, job: Job, failure: Failure | None) -> None:
+        """Move the outputs into place, and say how it went."""
+        folder, target = Path(job.work), Path(job.reports) / job.name
+        seconds = round(time.monotonic() - (one.started or 0.0), 1)
+        status: dict[str, Any] = {
+            "study": job.name,
+            "state": "failed" if failure else "done",
+            "reason": failure.reason if failure else "",
+            "started": one.began,
+            "finished": _now(),
+            "seconds": seconds,
+            "fingerprint": job.fingerprint,
+            # Of what the page shows less than the study's own: {"seeds": [5, 200]}; {} where it is whole.
+            "first_look": {} if failure else job.first_look,
+        }
+        try:
+            if failure is not None:
+                leave_failure(job, failure, one.cell, status, folder)
+            install(folder, target, status)
+        finally:
+            clear(job)
+        if failure is None and job.seeds is not None:
+            sweep_seeds(job.seeds)
+        outcome = Outcome(job.name, str(status["state"]), seconds, str(status["reason"]), target)
         self.outcomes[job.name] = outcome
         self.tell(job.name, "end", outcome)
 
 
-@dataclass
-class _Running:
-    job: Job
-    process: BaseProcess
-    pipe: connection.Connection
-    #: When the study began, its seeds included, and when this process did.
-    started: float
-    began: str
-    alone: float
-    cell: int | None = None
-    failure: Failure | None = None
-    done: bool = False
-
-    def over(self, tell: Listener) -> bool:
-        """Read what the process says; True when it is done, failed, gone or out of time."""
-        gone = not self.process.is_alive()
-        try:
-            while not (self.done or self.failure) and self.pipe.poll():
-                message = self.pipe.recv()
-                if message[0] == "done":
-                    self.done = True
-                elif message[0] == "failed":
-                    self.failure = message[1]
-                else:
-                    self.cell = message[1] if message[0] == "cell" else self.cell
-                    tell(self.job.name, message[0], message[1:])
-        except (EOFError, OSError):
-            gone = True
-        if not (self.done or self.failure):
-            if gone:
-                self.process.join(5)
-                self.failure = self._failure(
-                    f"Its process crashed or was ended from outside (exit code {self.process.exitcode}); "
-                    "the usual cause is too little memory: close other programs, or run with `--jobs 1`"
-                )
-            elif time.monotonic() - self.alone > self.job.timeout_s:
-                self.failure = self._failure(
-                    f"It was stopped at its time limit of {_duration(self.job.timeout_s)}. "
-                    "If it only needs longer, give it more: `--timeout MINUTES`"
-                )
-        if self.done or self.failure:
-            self.end()
-            return True
-        return False
-
-    def _failure(self, reason: str) -> Failure:
-        return Failure(f"{reason}.", "", log_of(self.job))
-
-    def end(self) -> None:
-        """End the process and all below it. Harmless where it has ended."""
-        if self.done or (self.failure and self.process.is_alive()):
-            self.process.join(3)
-        if self.process.pid is not None and self.process.is_alive():
-            end_tree(self.process.pid)
-        self.process.join()
-        self.pipe.close()
-
-
-def _start(waiting: _Waiting) -> _Running:
-    job = waiting.job
-    clear(job)
-    Path(job.work).mkdir(parents=True)
-    ours, theirs = connection.Pipe(duplex=False)
-    process = start_process(f"wildlab {job.name}", run_notebook, theirs, job)
-    theirs.close()
-    now = time.monotonic()
-    return _Running(job, process, ours, waiting.started or now, waiting.began, now)
-
-
-def _finish_without_notebook(one: _Waiting) -> Outcome:
-    """The end of a study whose seeds failed. Those that did not are kept."""
-    clear(one.job)
-    Path(one.job.work).mkdir(parents=True)
-    first = min(one.failures, key=lambda failed: failed[0])[1]
-    reason = failed_seeds([(seed, failure.reason) for seed, failure in one.failures])
-    failure = Failure(f"{reason[:1].upper()}{reason[1:]}.", "", first.details)
-    return _finish(one.job, failure, None, one.started or time.monotonic(), one.began)
-
-
-def _finish(job: Job, failure: Failure | None, cell: int | None, started: float, began: str) -> Outcome:
-    """Move the outputs into place and say how it went."""
-    folder, target = Path(job.work), Path(job.reports) / job.name
-    seconds = round(time.monotonic() - started, 1)
-    status: dict[str, Any] = {
-        "study": job.name,
-        "state": "failed" if failure else "done",
-        "reason": failure.reason if failure else "",
-        "started": began,
-        "finished": _now(),
-        "seconds": seconds,
-        "fingerprint": job.fingerprint,
-        # Of what the page shows less than the study's own: {"seeds": [5, 200]}; {} where it is whole.
-        "first_look": {} if failure else job.first_look,
-    }
-    try:
-        if failure is not None:
-            leave_failure(job, failure, cell, status, folder)
-        install(folder, target, status)
-    finally:
-        clear(job)
-    if failure is None and job.seeds is not None:
-        sweep_seeds(job.seeds)
-    return Outcome(job.name, str(status["state"]), seconds, str(status["reason"]), target)
+def _reason(one: _Study) -> str:
+    return failed_seeds([(seed, failure.reason) for seed, failure in one.failures])
 
 
 def _now() -> str:
     return datetime.now(UTC).isoformat(timespec="seconds")
 
 
-def _duration(seconds: float) -> str:
-    return f"{seconds / 60:g} minutes" if seconds >= 120 else f"{seconds:g} seconds"
+_ADDRESS = re.compile(r"(tcp|tls)://(\[[0-9A-Fa-f:.]+\]|[\w.-]+):\d{1,5}")
+#: How long a scheduler may take to answer at first, in seconds.
+PATIENCE_S = 15
+#: How often a seed is tried again whose worker could not take it up (not: whose computation failed).
+RETRIES = 2
+
+
+class Cluster(AbstractContextManager["Cluster"]):
+    """A cluster that computes seeds in place of processes of this machine; the queue is its scheduler's.
+
+    Parameters
+    ----------
+    address
+        Of the scheduler: ``tcp://HOST:PORT``, or ``tls://HOST:PORT`` with dask configured for it.
+    timeout_s
+        How long to wait for the next seed before giving up.
+
+    Raises
+    ------
+    WildlabError
+        If dask is not installed, the address is none, no scheduler answers there, or it has no workers.
+    """
+
+    def __init__(self, address: str, *, timeout_s: float = 1800.0) -> None:
+        self._client = _connect(address)
+        self._timeout_s = timeout_s
+        self._heard = time.monotonic()
+        self._under_way: dict[Any, Any] = {}
+
+    def __exit__(self, *_: object) -> None:
+        if self._under_way and self._client.status == "running":
+            self._client.cancel(list(self._under_way), force=True)
+        self._client.close(timeout=5)
+
+    def submit(self, doing: Any, given: Sequence[Any]) -> None:
+        """Send what `wildlab.runner.seeds.answer` takes to the scheduler."""
+        if not self._under_way:
+            self._heard = time.monotonic()
+        self._under_way[self._client.submit(answer, *given, pure=False, retries=RETRIES)] = doing
+
+    def collect(self) -> Iterator[tuple[Any, tuple[str, Any]]]:
+        """What is over since the last time, with its answer.
+
+        Raises
+        ------
+        RunFailed
+            If the scheduler is gone, or nothing was heard for too long.
+        """
+        for future in [one for one in self._under_way if one.done()]:
+            self.refuse_lost()
+            doing, self._heard = self._under_way.pop(future), time.monotonic()
+            try:
+                said: tuple[str, Any] = future.result(timeout=PATIENCE_S)
+            except Exception as error:  # the worker's, or dask's own
+                self.refuse_lost()
+                why = f"{type(error).__name__}: {error}".splitlines()[0][:300]
+                said = "failed", (f"The cluster could not compute it ({why}).", "", "")
+            yield doing, said
+        self.refuse_lost()
+
+    def refuse_lost(self) -> None:
+        """Stop where the scheduler is gone, or says nothing."""
+        if not self._under_way:
+            return
+        lost = self._client.status != "running"
+        if lost or time.monotonic() - self._heard > self._timeout_s:
+            raise RunFailed(
+                "the connection to the scheduler is lost"
+                if lost
+                else f"no seed came back from the cluster for {self._timeout_s:g} s",
+                "see that it and its workers run, and run it again; the finished seeds are kept",
+                field="--scheduler",
+            )
+
+
+def _connect(address: str) -> Any:
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise WildlabError(
+            "a cluster needs dask.distributed, which is not installed here",
+            "install it: python -m pip install distributed (in a checkout: make environment)",
+            field="--scheduler",
+        ) from error
+    if not _ADDRESS.fullmatch(address):
+        raise WildlabError(
+            f"{address!r} is no address of a scheduler",
+            "give it as the scheduler prints it, for example tcp://127.0.0.1:8786",
+            field="--scheduler",
+        )
+    try:
+        client = Client(address, timeout=PATIENCE_S, set_as_default=False)
+    except (OSError, TimeoutError, ValueError, RuntimeError) as error:
+        raise WildlabError(
+            f"no scheduler answers at {address}",
+            "start one (dask scheduler), and see that its port can be reached from here",
+            field="--scheduler",
+        ) from error
+    if not client.scheduler_info()["workers"]:
+        client.close(timeout=5)
+        raise WildlabError(
+            f"the scheduler at {address} has no workers",
+            f"start some, in this environment: dask worker {address} --nthreads 1",
+            field="--scheduler",
+        )
+    return client

@@ -15,21 +15,27 @@ file of another key or seed would else become a verdict. Such a file is damaged:
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
+import logging
 import math
+import os
 import platform
 import shutil
+import traceback
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
+from multiprocessing import connection
 from pathlib import Path
 from typing import Any
 
 from wildlab.errors import WildlabError
 from wildlab.files import digest, write_atomic
 from wildlab.paths import DATA, PACKAGE
-from wildlab.studies.protocol import Values, case_names, find_case
+from wildlab.runner.processes import end_with_runner
+from wildlab.studies.protocol import Values, case_names, find_case, run_trial
 
 #: A change in any of these rooms can change a number.
 ROOMS = (
@@ -266,3 +272,63 @@ def failed_seeds(failures: Sequence[tuple[int, str]]) -> str:
     (first, reason), *others = sorted(failures)
     also = f" (so did {len(others)} more: {_first([seed for seed, _ in others])})" if others else ""
     return f"seed {first} failed{also}: {reason.rstrip('.')}"
+
+
+# -- computing them
+# ------------------------------------------------------------------------------------
+
+
+def answer(case: str, seed: int, parameters: dict[str, Any], code: str) -> tuple[str, Any]:
+    """``("done", values)`` or ``("failed", (reason, "", details))`` for one seed, here or on a cluster.
+
+    ``code`` is the runner's `code_key`: numbers of other code are not mixed in.
+    """
+    from wildlab.reporting.notebook_pages import clean_text
+
+    try:
+        _same_code(code)
+        return "done", run_trial(case, seed, parameters)
+    except Exception as error:  # whatever it is, the runner must hear of it
+        known = isinstance(error, WildlabError)
+        reason = str(error) if known else f"The computation raised {type(error).__name__}: {error}."
+        return "failed", (clean_text(reason), "", clean_text(traceback.format_exc()))
+
+
+#: The code that this process runs; looked up once, because modules are imported once.
+_CODE: list[str] = []
+
+
+def _same_code(code: str) -> None:
+    if not _CODE:
+        _CODE.append(code_key())
+    if _CODE[0] != code:
+        raise WildlabError(
+            "the code, the twins' parameters or the packages here are not those that the run began with",
+            "run it again; on a cluster, give every worker the same wildlab and environment",
+        )
+
+
+def serve(pipe: connection.Connection) -> None:
+    """Body of a process: what `answer` is given comes in, an answer goes out; ends when the pipe does."""
+    end_with_runner()
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    for stream in (1, 2):  # a warning would break the runner's display
+        os.dup2(nowhere, stream)
+    logger = logging.getLogger("wildlab")
+    logger.setLevel(logging.INFO)
+    logger.addHandler(_ToRunner(pipe))
+    with contextlib.suppress(EOFError, OSError):
+        while True:
+            pipe.send(answer(*pipe.recv()))
+
+
+class _ToRunner(logging.Handler):
+    """What the code below logs (that it compiles, which takes a while) goes to the runner, to be shown."""
+
+    def __init__(self, pipe: connection.Connection) -> None:
+        super().__init__(logging.INFO)
+        self._pipe = pipe
+
+    def emit(self, record: logging.LogRecord) -> None:
+        with contextlib.suppress(OSError):
+            self._pipe.send(("note", record.getMessage()))

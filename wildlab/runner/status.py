@@ -13,13 +13,16 @@ from typing import Any
 from wildlab.errors import WildlabError
 from wildlab.files import digest, sha256, write_json
 from wildlab.reporting.metrics import read_metrics
-from wildlab.reporting.published import FOLDER, compared_number, load_claims, published_rows
-from wildlab.reporting.status import (
+from wildlab.reporting.published import (
     FIRST_LOOK,
+    FOLDER,
     Claim,
     Number,
     StudyStatus,
+    compared_number,
     describe_first_look,
+    load_claims,
+    published_rows,
 )
 from wildlab.runner.catalogue import StudyEntry
 

@@ -1,9 +1,7 @@
 """The tutorials of ``notebooks/tutorials``, each run in a process of its own and left as one offline page.
 
-``python -m wildlab.runner.tutorials`` runs those whose page is not there yet, or was made from another
-notebook, other code or other packages, and writes ``reports/tutorials/<name>.html``. What a page was made
-from stands in a comment at its end. A tutorial that fails leaves ``reports/tutorial-<name>/``, as a study
-would, and no page; the others go on.
+``python -m wildlab.runner.tutorials`` runs them and writes ``reports/tutorials/<name>.html``. A tutorial that
+fails leaves ``reports/tutorial-<name>/``, as a study would, and no page; the others go on.
 """
 
 from __future__ import annotations
@@ -13,31 +11,19 @@ import os
 import shutil
 import sys
 from collections.abc import Sequence
-from importlib.metadata import version
+from contextlib import nullcontext
 from pathlib import Path
 
 from rich.console import Console
 
 from wildlab.errors import WildlabError
-from wildlab.files import digest, write_atomic
-from wildlab.paths import DATA, NOTEBOOKS, PACKAGE, REPORTS
+from wildlab.paths import NOTEBOOKS, REPORTS
 from wildlab.reporting.notebook_pages import read_notebook
 from wildlab.runner.catalogue import load_studies
 from wildlab.runner.job import Job
 from wildlab.runner.ledger import build_ledger, title_of, tutorial_links, tutorial_notebooks
 from wildlab.runner.progress import shown
 from wildlab.runner.scheduling import Outcome, run_jobs
-from wildlab.runner.seeds import code_key
-
-#: What a tutorial shows comes out of these besides the rooms below them (`wildlab.runner.seeds`).
-_SHOWING = (
-    "api/*.py",
-    "reporting/**/*.py",
-    "summary_table.py",
-    "runner/tutorials.py",
-    "runner/notebook_process.py",
-)
-_PACKAGES = ("matplotlib", "nbconvert", "latex2mathml")
 
 
 def run_tutorials(
@@ -47,7 +33,7 @@ def run_tutorials(
     parallel: int = 1,
     console: Console | None = None,
 ) -> list[Outcome]:
-    """Run the tutorials whose pages are not there or out of date, and write their pages.
+    """Run the tutorials, and write their pages.
 
     Parameters
     ----------
@@ -63,7 +49,7 @@ def run_tutorials(
     Returns
     -------
     list of Outcome
-        Of those that were run; ``folder`` of one that failed has a page that says why.
+        ``folder`` of one that failed has a page that says why.
 
     Raises
     ------
@@ -75,16 +61,15 @@ def run_tutorials(
         raise WildlabError("there are no tutorials", "restore notebooks/tutorials", file=notebooks)
     reports = reports.resolve()
     (reports / "tutorials").mkdir(parents=True, exist_ok=True)
-    marks = {path: _mark(path) for path in found}
-    jobs = {path: _job(path, reports) for path in found if not _kept(path, reports, marks[path])}
-    # A terminal shows a bar; elsewhere each has a line of its own.
-    if console is not None:
-        with shown(console) as listen:
-            outcomes = run_jobs(list(jobs.values()), parallel=parallel, listen=listen)
-    else:
-        outcomes = run_jobs(list(jobs.values()), parallel=parallel)
-    for path, outcome in zip(jobs, outcomes, strict=True):
-        _put(outcome, _page(path, reports), marks[path])
+    with shown(console) if console is not None else nullcontext() as listen:
+        outcomes = run_jobs([_job(path, reports) for path in found], parallel=parallel, listen=listen)
+    for path, outcome in zip(found, outcomes, strict=True):
+        page = reports / "tutorials" / f"{path.stem}.html"
+        # What another code made goes, where this one failed.
+        page.unlink(missing_ok=True)
+        if outcome.state == "done" and outcome.folder is not None:
+            (outcome.folder / "report.html").replace(page)
+            shutil.rmtree(outcome.folder)
     return outcomes
 
 
@@ -101,32 +86,6 @@ def _job(path: Path, reports: Path) -> Job:
         cells=len(read_notebook(path).cells),
         tutorial=True,
     )
-
-
-def _put(outcome: Outcome, page: Path, mark: str) -> None:
-    """Move a finished page to where it is read from. What another code made goes, where this one failed."""
-    if outcome.state != "done" or outcome.folder is None:
-        page.unlink(missing_ok=True)
-        return
-    whole = (outcome.folder / "report.html").read_text(encoding="utf-8")
-    write_atomic(page, whole + mark)
-    shutil.rmtree(outcome.folder)
-
-
-def _page(path: Path, reports: Path) -> Path:
-    return reports / "tutorials" / f"{path.stem}.html"
-
-
-def _kept(path: Path, reports: Path, mark: str) -> bool:
-    page = _page(path, reports)
-    return page.is_file() and page.read_text(encoding="utf-8").endswith(mark)
-
-
-def _mark(notebook: Path) -> str:
-    """What a page is made from, as the comment that ends it."""
-    shows = sorted({path for pattern in _SHOWING for path in PACKAGE.glob(pattern)})
-    files = [(path.name, path) for path in (*shows, *sorted((DATA / "pages").glob("*")), notebook)]
-    return f"<!-- made from {digest([code_key(), *map(version, _PACKAGES)], files)} -->\n"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -23,6 +23,7 @@ from wildlab.reporting.published import judge, load_claims, published_rows
 from wildlab.reporting.report import open_report
 from wildlab.reporting.text import slug
 from wildlab.runner.catalogue import StudyEntry, find_study, load_studies
+from wildlab.runner.scheduling import compute_seeds
 from wildlab.runner.seeds import (
     SeedWork,
     make_work,
@@ -31,7 +32,6 @@ from wildlab.runner.seeds import (
     sweep_seeds,
     trial_key,
 )
-from wildlab.runner.worker_pool import compute_seeds
 from wildlab.simulation import load_twin
 from wildlab.simulation.parameters import groups_of
 from wildlab.studies.page import decide_claims, record_spread

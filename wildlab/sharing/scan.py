@@ -34,7 +34,7 @@ from wildlab.geometry.gravity import normal_gravity
 from wildlab.paths import ROOT
 from wildlab.sharing.allow_list import DATA_ADDRESS, FORMS, own_phrases, own_vocabulary
 from wildlab.sharing.generalisation import Generalised, first_stamp, names_in, new_origin
-from wildlab.sharing.reports import Source
+from wildlab.sharing.recomputation import Source
 from wildlab.sharing.tiers import Treatment, describe
 
 #: So many places of each table are looked for; the scan finds what is near to one of them.

@@ -30,8 +30,14 @@ from wildlab.runner.catalogue import load_studies
 from wildlab.sharing.allow_list import Chapter, first_foreign_word, join_chapters, read_part
 from wildlab.sharing.edition import edition_html, facts_of, map_of
 from wildlab.sharing.generalisation import Generalised, generalise
-from wildlab.sharing.recomputation import RecomputedReports, describe_agreement, recompute_reports
-from wildlab.sharing.reports import Source, flight_folder, sources_of
+from wildlab.sharing.recomputation import (
+    RecomputedReports,
+    Source,
+    describe_agreement,
+    flight_folder,
+    recompute_reports,
+    sources_of,
+)
 from wildlab.sharing.scan import Secrets, SecretSearch, all_of, flight_secrets, machine_secrets, search_limits
 from wildlab.sharing.tiers import (
     Tier,

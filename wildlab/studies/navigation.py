@@ -43,15 +43,16 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
 from wildlab.messages.catalogue import Message, load_texts
 from wildlab.messages.quantities import significant
+from wildlab.reporting.charts.drawing import Curve, squares_chart
 from wildlab.reporting.charts.flights import (
     bias_chart,
     error_bands,
     mark_period,
     poses_between,
-    squares_chart,
     strips,
 )
 from wildlab.reporting.charts.tracks import aircraft_map
+from wildlab.reporting.figures import BLUE
 from wildlab.reporting.report import Report, Wording
 from wildlab.simulation.twins import simulate_twin
 from wildlab.studies.page import Shown, tile_of
@@ -297,13 +298,16 @@ def flight_figures(studied: Studied, window: Period, figures: int | None) -> lis
     )
     _, velocity = poses_between(moving, *window)
     speeds = {
-        name: (times, {"speed over ground (m/s)": np.sqrt(sum(np.square(one) for one in parts.values()))})
-        for name, (times, parts) in velocity.items()
+        name: (
+            velocity["north (m/s)"][name][0],
+            np.sqrt(sum(np.square(one[name][1]) for one in velocity.values())),
+        )
+        for name in moving
     }
     shown = {
         "attitude": (0, strips(attitude)),
         "velocity": (1, strips(velocity)),
-        "speed": (4, strips(speeds)),
+        "speed": (4, strips({"speed over ground (m/s)": speeds})),
     }
     return [
         _marked(studied, fig, text, "" if figures is None else f"fig-7-{figures + offset}")
@@ -355,15 +359,21 @@ def nis_figure(studied: Studied, window: Period) -> Shown:
     """NIS of the filter's innovations, by source."""
     raw = studied.found["mekf"].innovations
     raw = raw[raw["time_s"].between(*window)]
-    nis = {str(name): (part["time_s"], part["nis"]) for name, part in raw.groupby("source", sort=False)}
-    return Shown(squares_chart(nis, 3, "NIS"), "nis")
+    by_source = raw.groupby("source", sort=False)
+    nis = {f"NIS\n{name}": _dots(part["time_s"], part["nis"]) for name, part in by_source}
+    return Shown(squares_chart(nis, 3), "nis")
 
 
 def nees_figure(studied: Studied, begin: float) -> Shown:
     """NEES of the filter over time, where there is a truth."""
     late, scored = studied.times >= begin, studied.scored["mekf"]
-    nees = {name: (studied.times[late], values[late]) for name, values in scored.nees.items()}
-    return Shown(squares_chart(nees, 3, "NEES"), "nees")
+    times = studied.times[late]
+    nees = {f"NEES\n{name}": _dots(times, values[late]) for name, values in scored.nees.items()}
+    return Shown(squares_chart(nees, 3), "nees")
+
+
+def _dots(times: ArrayLike, values: ArrayLike) -> list[Curve]:
+    return [Curve(times, values, BLUE, look={"size": 2, "rasterized": True}, dots=True)]
 
 
 def simulated_figures(studied: Studied, window: Period, tuned: str, figures: int) -> list[Shown]:

@@ -17,7 +17,7 @@ from wildlab.evaluation.errors import summarise
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
 from wildlab.reporting.charts.drawing import with_breaks
-from wildlab.reporting.charts.tracks import aircraft_map, errors_over_time, positions_map
+from wildlab.reporting.charts.tracks import aircraft_map, error_over_time, positions_map
 from wildlab.reporting.figures import colour
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.target_motion import target_path
@@ -235,5 +235,8 @@ def track_figures(scored: pd.DataFrame) -> list[Shown]:
     for name, one in tracks.items():
         # A pause in the observations breaks the line.
         (times, raw), (_, estimate) = (with_breaks(one.times, values, PAUSE_S) for values in errors[name])
-        shown.append(Shown(errors_over_time(times / 60, raw, estimate, "time (min)", reach=reach), name))
+        every, own = np.ones(len(times), bool), {"kf": estimate}
+        fig = error_over_time(times / 60, every, own, {"kf": "filtered"}, measured=raw, xlabel="time (min)")
+        fig.axes[0].set_ylim(0, reach)
+        shown.append(Shown(fig, name))
     return shown

@@ -14,9 +14,9 @@ from wildlab.evaluation.consistency import autocorrelation
 from wildlab.evaluation.errors import summarise
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import Flight
-from wildlab.reporting.charts.drawing import correlations_chart
+from wildlab.reporting.charts.drawing import correlations_chart, draw_band
 from wildlab.reporting.charts.flights import poses_between, strips
-from wildlab.reporting.charts.tracks import aircraft_map, error_scatter, errors_over_time
+from wildlab.reporting.charts.tracks import aircraft_map, error_over_time, error_scatter
 from wildlab.reporting.figures import BLUE, VERMILLION, colour
 from wildlab.simulation.onboard_sensors import as_mounted, mounted_imu
 from wildlab.simulation.parameters import load_twin
@@ -199,7 +199,10 @@ def filter_figures(scored: pd.DataFrame, bound: float) -> list[Shown]:
         for i, (axis, color) in enumerate((("north", BLUE), ("east", VERMILLION)))
     }
     index = np.arange(len(measured))
+    every, one = np.ones(len(index), bool), {"kf": estimated}
+    errors = error_over_time(index, every, one, {"kf": "filtered"}, measured=measured, xlabel="observation")
+    draw_band(errors.axes[0], index, 0 * predicted, 2 * predicted, colour("kf"))
     return [
-        Shown(errors_over_time(index, measured, estimated, "observation", 2 * predicted), "fig-5-06"),
+        Shown(errors, "fig-5-06"),
         Shown(correlations_chart({"autocorrelation": lags}, [bound]), "fig-5-07"),
     ]

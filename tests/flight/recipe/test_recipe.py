@@ -23,7 +23,7 @@ from wildlab.flight.recipes import Attitude
 from wildlab.flight.schema import UNITS, factor
 from wildlab.flight.store import Flight, accept_changes, load_flight
 from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
-from wildlab.runner.track import track_many
+from wildlab.runner.evaluate import track_many
 
 ORIGIN = "latitude_deg = 63.44\nlongitude_deg = 10.4\nheight_m = 40.0"
 

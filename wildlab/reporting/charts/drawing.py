@@ -19,6 +19,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import NullLocator
 from numpy.typing import ArrayLike, NDArray
 
+from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.geometry.terrain import Terrain
 from wildlab.names import figure_name
 from wildlab.reporting.figures import (
@@ -30,6 +31,8 @@ from wildlab.reporting.figures import (
     PURPLE,
     SKY,
     VERMILLION,
+    log_band,
+    mark_gaps,
     new_figure,
     plain_numbers,
     thinned,
@@ -95,6 +98,41 @@ def draw_band(
     keep = thinned(len(x))
     look = {"alpha": 0.2, "lw": 0, "zorder": 3} | look
     ax.fill_between(x[keep], low[keep], high[keep], color=color, **_label(name), **look)
+
+
+class Curve(NamedTuple):
+    """Values (N,) over time or else, their colour, name and look; ``dots``: no line joins them."""
+
+    x: ArrayLike
+    y: ArrayLike
+    color: str
+    name: object = ""
+    look: Mapping[str, Any] = {}
+    dots: bool = False
+
+
+def squares_chart(
+    strips: Mapping[str, Sequence[Curve]],
+    dof: float,
+    gaps: tuple[ArrayLike, float] = ((), 0.0),
+    xlabel: str = "time (s)",
+) -> Figure:
+    """NEES or NIS on log axes, a strip for each label, with the 95 % band of single values.
+
+    Values far below the band are cut off: they say no more than that they are there. ``gaps``: times with
+    values, and the longest pause that is not shaded.
+    """
+    fig, axes = new_strips(len(strips), 1.8 * len(strips) + 1.5)
+    low, high = chi_square_interval(dof)
+    for ax, (label, curves) in zip(axes, strips.items(), strict=True):
+        for one in curves:
+            draw = draw_dots if one.dots else draw_line
+            draw(ax, one.x, one.y, one.color, one.name, **one.look)
+        log_band(ax, low, high)
+        mark_gaps(ax, *gaps)
+        values = np.concatenate([np.asarray(one.y, float) for one in curves])
+        ax.set(ylim=(low / 12, max(3 * high, 1.5 * float(np.nanquantile(values, 0.999)))), ylabel=label)
+    return finish(fig, xlabel)
 
 
 def correlations_chart(

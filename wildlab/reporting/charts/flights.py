@@ -13,7 +13,6 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from wildlab.analysis.overview import TROUBLES, Coverage, Issue, Path
-from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.evaluation.streams import FINE, HARMFUL, Pace
 from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
 from wildlab.names import figure_name
@@ -42,7 +41,6 @@ from wildlab.reporting.figures import (
     SKY,
     VERMILLION,
     colour,
-    log_band,
     map_axes,
     new_figure,
     thinned,
@@ -56,43 +54,52 @@ NAMES = {
     "mekf-published-like-long": "filter, tuned like H 7.5.4, flight 2",
     "onboard": "found on board",
 }
-#: Quantities over time by label with unit: times (seconds), and values.
-Strips = tuple[ArrayLike, Mapping[str, ArrayLike]]
+#: Labels of strips whose jumps at 180 degrees are not joined.
+ANGLES = ("roll (°)", "pitch (°)", "yaw (°)")
+#: Quantities over time by label with unit, each by source: times (s), and values.
+Strips = Mapping[str, Mapping[str, tuple[ArrayLike, ArrayLike]]]
 
 
-def poses_between(
-    nav: Mapping[str, pd.DataFrame], start: float, end: float
-) -> tuple[dict[str, Strips], dict[str, Strips]]:
+def poses_between(nav: Mapping[str, pd.DataFrame], start: float, end: float) -> tuple[Strips, Strips]:
     """Attitude (degrees) and velocity of nav tables between two times (seconds), for `strips`."""
-    attitude: dict[str, Strips] = {}
-    velocity: dict[str, Strips] = {}
+    attitude: dict[str, dict[str, tuple[ArrayLike, ArrayLike]]] = {}
+    velocity: dict[str, dict[str, tuple[ArrayLike, ArrayLike]]] = {}
     for name, table in nav.items():
         part = table[table["time_s"].between(start, end)]
         q = part[["q_w", "q_x", "q_y", "q_z"]].to_numpy(float)
         euler = np.degrees(matrix_to_euler(quaternion_to_matrix(q))).T
-        attitude[name] = (part["time_s"], dict(zip(("roll (°)", "pitch (°)", "yaw (°)"), euler, strict=True)))
-        axes = ("north", "east", "down")
-        velocity[name] = (part["time_s"], {f"{axis} (m/s)": part[f"v_{axis}_m_s"] for axis in axes})
+        for label, angle in zip(ANGLES, euler, strict=True):
+            attitude.setdefault(label, {})[name] = part["time_s"], angle
+        for axis in ("north", "east", "down"):
+            velocity.setdefault(f"{axis} (m/s)", {})[name] = part["time_s"], part[f"v_{axis}_m_s"]
     return attitude, velocity
 
 
-def strips(sources: Mapping[str, Strips]) -> Figure:
+def strips(quantities: Strips, clock: Clock | None = None) -> Figure:
     """Quantities over time, one strip each, one line for each source; jumps of angles are not joined.
 
     Parameters
     ----------
-    sources
-        By name of the source, which has its fixed colour; all have the same labels.
+    quantities
+        Of sources, which have the same colour in all strips.
+    clock
+        Of the abscissa; left out, seconds.
     """
-    labels = list(next(iter(sources.values()))[1])
-    fig, axes = new_strips(len(labels), 1.2 * len(labels) + 1.4)
+    fig, axes = new_strips(len(quantities), 1.2 * len(quantities) + 1.4)
+    sources = list(dict.fromkeys(name for one in quantities.values() for name in one))
     # Of lines that lie on one another the first is the widest, so that each later one shows it.
-    widths = np.linspace(1.0 + 0.9 * (len(sources) - 1), 1.0, len(sources))
-    for ax, label in zip(axes, labels, strict=True):
-        for width, (name, (times, quantities)) in zip(widths, sources.items(), strict=True):
-            draw_line(ax, times, without_jumps(quantities[label]), colour(name), _named(name), width=width)
+    widths = np.linspace(min(1.0 + 0.9 * (len(sources) - 1), 2.8), 1.0, len(sources))
+    looks = _looks(sources)
+    for ax, (label, one) in zip(axes, quantities.items(), strict=True):
+        for width, (name, look) in zip(widths, looks.items(), strict=True):
+            if name in one:
+                times, values = one[name]
+                values = without_jumps(values) if label in ANGLES else values
+                draw_line(
+                    ax, clock(times) if clock else times, values, name=_named(name), width=width, **look
+                )
         ax.set_ylabel(label)
-    return finish(fig, "time (s)")
+    return finish(fig, clock.label if clock else "time (s)")
 
 
 def mark_period(fig: Figure, period: tuple[float, float] | None) -> None:
@@ -162,23 +169,6 @@ def bias_chart(times: ArrayLike, biases: ArrayLike, sd: ArrayLike) -> Figure:
     return finish(fig, "time (s)")
 
 
-def squares_chart(series: Mapping[str, tuple[ArrayLike, ArrayLike]], dof: int, what: str) -> Figure:
-    """NIS or NEES over time on log axes, a strip for each series, with the 95 % band of single values.
-
-    ``series`` has times and values by name.
-    """
-    fig, axes = new_strips(len(series), 1.6 * len(series) + 0.4)
-    low, high = chi_square_interval(dof)
-    for ax, (name, (times, values)) in zip(axes, series.items(), strict=True):
-        v = np.asarray(values, float)
-        draw_line(ax, times, v, BLUE, ls="none", marker=".", ms=2, alpha=0.5, mec="none", rasterized=True)
-        log_band(ax, low, high)
-        lowest, highest = np.nanquantile(v, [0.005, 0.999])
-        ax.set_ylim(min(low / 3, float(lowest)), max(high * 3, float(highest)))
-        ax.set_ylabel(f"{what}\n{name}")
-    return finish(fig, "time (s)")
-
-
 def _named(source: str) -> str:
     return NAMES.get(source, source)
 
@@ -196,8 +186,6 @@ SHADES = ("#D6E8F2", "#A9CFE4", "#74B0D4", "#3F8DBF", "#14679E", "#083F66")
 SHORTEST_S = 1.0
 #: Of a chart of many samples.
 COLUMNS = 700
-#: Values of a source by time: (N,) s, (N, ...).
-Series = Mapping[str, tuple[Array, Array]]
 
 
 class Clock:
@@ -298,42 +286,12 @@ def streams_chart(streams: Mapping[str, Pace], clock: Clock) -> Figure:
     return finish(fig, clock.label)
 
 
-def lines_chart(
-    series: Series,
-    clock: Clock,
-    label: str,
-    *,
-    ground: tuple[Array, Array] | None = None,
-    floor: bool = False,
-) -> Figure:
-    """One quantity over time, a line for each source; ``ground`` is the height of the ground below."""
-    fig, ax = new_figure(4.6, 3.3)
-    if ground is not None:
-        draw_line(ax, clock(ground[0]), ground[1], GREY, "ground", ls="-.")
-    for name, look in _looks(series).items():
-        draw_line(ax, clock(series[name][0]), series[name][1], name=name, **look)
-    if floor:
-        ax.set_ylim(0, None)
-    return finish(fig, clock.label, label)
-
-
-def attitude_chart(series: Series, clock: Clock) -> Figure:
-    """Roll, pitch and yaw over time, a strip each; jumps at 180 degrees are not joined."""
-    fig, axes = new_strips(3, 4.8, 4.6)
-    for row, (ax, axis) in enumerate(zip(axes, ("roll (°)", "pitch (°)", "yaw (°)"), strict=True)):
-        for name, look in _looks(series).items():
-            times, angles = series[name]
-            draw_line(ax, clock(times), without_jumps(angles[:, row]), name=name, **look)
-        ax.set_ylabel(axis)
-    return finish(fig, clock.label)
-
-
-def _looks(series: Mapping[str, object]) -> dict[str, dict[str, Any]]:
+def _looks(sources: Sequence[str]) -> dict[str, dict[str, Any]]:
     """Looks of sources, the truth first, since it lies behind what is judged by it: it is black, a second one
     dashed; others have their colour of all figures, if any."""
-    taken = {COLOURS.get(name) for name in series}
+    taken = {COLOURS.get(name) for name in sources}
     others = iter((*(one for one in LINES if one not in taken), *LINES * 3))
-    named = sorted(series, key=lambda one: not one.startswith("truth"))
+    named = sorted(sources, key=lambda one: not one.startswith("truth"))
     truths = sum(one.startswith("truth") for one in named)
     return {
         name: {"color": colour("truth"), "ls": "--" if index else "-"}

@@ -35,9 +35,9 @@ from wildlab.reporting.charts.drawing import (
     LINES,
     TRUTH,
     Array,
+    Curve,
     Shown,
     correlations_chart,
-    draw_band,
     draw_dots,
     draw_line,
     draw_platform,
@@ -47,6 +47,7 @@ from wildlab.reporting.charts.drawing import (
     name_rows,
     new_strips,
     spread_points,
+    squares_chart,
     with_breaks,
     without_jumps,
 )
@@ -62,7 +63,6 @@ from wildlab.reporting.figures import (
     ellipse,
     end_label,
     filter_words,
-    log_band,
     map_axes,
     mark_gaps,
     new_figure,
@@ -75,8 +75,6 @@ from wildlab.reporting.figures import (
 GAP_S = 2.0
 #: Dots of so many flights are large enough to be seen alone.
 FEW = 20
-#: Courses that stay this near to one, degrees, are drawn about it.
-STEADY = 60.0
 #: Later lines are thinner, so that one which lies on another does not hide it.
 _WIDTHS = (2.6, 1.3, 1.3, 1.0)
 #: From a number to what it is of.
@@ -124,6 +122,7 @@ def error_over_time(
     names: Mapping[str, str],
     *,
     measured: ArrayLike | None = None,
+    xlabel: str = _SINCE,
 ) -> Figure:
     """Errors of tracks in metres over time, with strokes at the detections; pauses are shaded.
 
@@ -147,12 +146,14 @@ def error_over_time(
         ax.axhline(0, color=GREY, lw=0.6)
         mark_gaps(ax, there, GAP_S)
         ax.set_ylabel(label)
+        if len(there) == len(np.asarray(times)):
+            continue
         # Short strokes along the lower edge, below all lines, where there are detections.
         bottom, top = ax.get_ylim()
         ax.set_ylim(bottom - 0.06 * (top - bottom), top)
         ax.plot(there, np.full(len(there), 0.025), "|", color=INK, ms=6, alpha=0.35,
                 transform=ax.get_xaxis_transform())  # fmt: skip
-    return finish(fig, _SINCE)
+    return finish(fig, xlabel)
 
 
 def speed_and_course(
@@ -170,23 +171,26 @@ def speed_and_course(
     fig, (fast, course) = new_strips(2, 4.8)
     lines = [(states, {"color": colour(name)} | look) for name, states, look in _looks(tracks, names)]
     lines.append((truth, {"name": "truth"} | TRUTH))
-    middle, reach = steady_course([course_of(states) for states, _ in lines])
+    # About the truth's mean course, so that one that is kept to does not jump over north.
+    turn = np.radians(course_of(truth))
+    turn = turn[np.isfinite(turn)]
+    middle = float(np.degrees(np.arctan2(np.sin(turn).sum(), np.cos(turn).sum()))) % 360
+    angles = [(course_of(states) - middle + 180) % 360 + middle - 180 for states, _ in lines]
     top = 0.0
-    for states, look in lines:
+    for (states, look), angle in zip(lines, angles, strict=True):
         speed = np.hypot(*np.asarray(states, float)[:, 2:4].T)
         draw_line(fast, times, speed, **look)
-        angle = (course_of(states) - middle + 180) % 360 + middle - 180
         draw_line(course, times, without_jumps(angle), **look)
         # The start, with no idea of the velocity, would press all the rest flat.
         top = max(top, float(np.nanquantile(speed, 0.99)))
     for ax in (fast, course):
         mark_gaps(ax, np.asarray(times, float)[np.asarray(seen, bool)], GAP_S)
     fast.set_ylim(0, 1.2 * top)
-    course.set(ylim=(middle - reach, middle + reach), ylabel="course (°)")
-    if reach > 180:
-        course.set_yticks([0, 90, 180, 270, 360])
-    else:
-        course.yaxis.set_major_formatter(FuncFormatter(lambda angle, _: f"{angle % 360:g}"))
+    course.set_ylabel("course (°)")
+    if np.isfinite(known := np.concatenate(angles)).any():
+        low, high = np.nanquantile(known, [0.01, 0.99])
+        course.set_ylim(low - 10, high + 10)
+    course.yaxis.set_major_formatter(FuncFormatter(lambda angle, _: f"{angle % 360:g}"))
     return finish(fig, _SINCE, "speed (m/s)")
 
 
@@ -197,49 +201,29 @@ def course_of(states: ArrayLike) -> Array:
     return np.where(np.hypot(x[:, 2], x[:, 3]) > SLOWEST_M_S, angle, np.nan)
 
 
-def steady_course(courses: Sequence[Array]) -> tuple[float, float]:
-    """The course that several (N,), the last one the truth's, keep to, and how far an axis about it reaches;
-    180 and a little more than that where they do not keep to one. Degrees."""
-    truth = np.radians(courses[-1][np.isfinite(courses[-1])])
-    middle = float(np.degrees(np.arctan2(np.sin(truth).sum(), np.cos(truth).sum()))) % 360
-    off = np.abs((np.concatenate(courses) - middle + 180) % 360 - 180)
-    off = off[np.isfinite(off)]
-    spread = float(np.quantile(off, 0.98)) if len(off) else 180.0
-    return (middle, max(10.0, 1.4 * spread)) if spread < STEADY else (180.0, 185.0)
-
-
 def squares_over_time(
     times: ArrayLike,
     seen: ArrayLike,
     values: Mapping[str, Mapping[str, ArrayLike]],
     names: Mapping[str, str],
 ) -> Figure:
-    """NEES or NIS (N,) of tracks on log axes, with the 95 % band of single values; pauses are shaded.
+    """NEES or NIS (N,) of tracks, with the band of single values; pauses are shaded.
 
-    Where a track has a value at detections only, it is drawn as dots. Values far below the band are cut off:
-    they say no more than that they are there.
+    Where a track has a value at detections only, it is drawn as dots.
 
     Parameters
     ----------
     values
         By what they are, which names the axis of their strip, and then by subject; two degrees of freedom.
     """
-    t, there = np.asarray(times, float), np.asarray(seen, bool)
-    low, high = chi_square_interval(2)
-    fig, strips = new_strips(len(values), 2.0 * len(values) + 1.5)
-    for ax, (what, series) in zip(strips, values.items(), strict=True):
-        highest = high
+    there = np.asarray(seen, bool)
+    strips: dict[str, list[Curve]] = {what: [] for what in values}
+    for what, series in values.items():
         for subject, v, look in _looks(series, names):
-            y = np.asarray(v, float)
-            if np.isfinite(y[~there]).any():
-                draw_line(ax, t, y, colour(subject), **look)
-            else:
-                draw_dots(ax, t, y, colour(subject), look["name"], size=3, rasterized=True)
-            highest = max(highest, float(np.nanmax(y)))
-        log_band(ax, low, high)
-        mark_gaps(ax, t[there], GAP_S)
-        ax.set(ylim=(low / 12, 2 * highest), ylabel=what)
-    return finish(fig, _SINCE)
+            sparse = not np.isfinite(np.asarray(v, float)[~there]).any()
+            more = {"size": 3, "rasterized": True} if sparse else {"width": look["width"]}
+            strips[what].append(Curve(times, v, colour(subject), look["name"], more, sparse))
+    return squares_chart(strips, 2, (np.asarray(times, float)[there], GAP_S), _SINCE)
 
 
 def values_over_flights(
@@ -430,28 +414,6 @@ def positions_map(
     return finish(fig)
 
 
-def errors_over_time(
-    times: ArrayLike, measured: ArrayLike, estimated: ArrayLike, xlabel: str,
-    stated: ArrayLike | None = None, reach: float | None = None,
-) -> Figure:  # fmt: skip
-    """Distances from the truth (T,) of single images and of the estimate, over times or numbers.
-
-    ``stated`` is what the filter states, from zero on; ``reach`` is the top of the axis in metres, for
-    figures that are to be compared.
-    """
-    t, raw, estimate = (np.array(a, float) for a in (times, measured, estimated))
-    fig, ax = new_figure(5.9, 3.5)
-    draw_dots(ax, t, raw, GREY, size=3)
-    draw_line(ax, t, estimate, BLUE, width=1.5)
-    if stated is not None:
-        draw_band(ax, t, 0 * t, stated, BLUE)
-    known = np.isfinite(estimate)
-    end_label(ax, t[-1], float(estimate[known][-1]), "filtered", BLUE)
-    end_label(ax, t[-1], float(np.nanmedian(raw)), "single\nimages", GREY)
-    ax.set_ylim(0, reach or 1.05 * float(np.nanmax([raw, estimate])))
-    return finish(fig, xlabel, "error (m)")
-
-
 def _finite(errors: ArrayLike) -> Array:
     e = np.asarray(errors, float).reshape(-1, 2)
     return np.asarray(e[np.isfinite(e).all(axis=1)])
@@ -528,31 +490,26 @@ def _middle(x: Array) -> Array:
 
 def squares_shown(tracks: Sequence[SensorTrack], rows: pd.DataFrame, what: str) -> Shown:
     """NEES (``"nees"``) or NIS of one target by one sensor over time, by filter, with the band."""
-    first, mean = tracks[0], _rows_of(tracks, rows)[what]
-    dof = 2.0 if what == "nees" else first.dof
-    fig, ax = new_figure(5.8, 3.8)
+    first, mean, nees = tracks[0], _rows_of(tracks, rows)[what], what == "nees"
+    dof = 2.0 if nees else first.dof
+    curves: list[Curve] = []
     drawn: dict[str, str] = {}
-    limits = [float(dof)]
     for one in tracks:
-        values = one.nees if what == "nees" else one.nis
-        if not np.isfinite(values).any():
-            continue
-        t, y = _lines(one, values)
-        y = np.maximum(y, 1e-4)
-        if what == "nees":
-            draw_line(ax, t, y, _tint(one.filter), filter_words(one.filter), width=1.4,
-                      ls="--" if one.filter.endswith(SMOOTHED) else "-")  # fmt: skip
-        else:
-            draw_dots(ax, t, y, _tint(one.filter), filter_words(one.filter), size=3.5)
-        limits += [float(np.nanmin(y)), float(np.nanmax(y))]
-        drawn[one.filter] = f"{mean[one.filter]:.2f}"
-    low, high = chi_square_interval(dof)
-    log_band(ax, low, high)
-    ax.set_ylim(max(min(limits) / 2, low / 30), 3 * max(limits))
+        values = one.nees if nees else one.nis
+        if np.isfinite(values).any():
+            t, y = _lines(one, values)
+            look = (
+                {"width": 1.4, "ls": "--" if one.filter.endswith(SMOOTHED) else "-"}
+                if nees
+                else {"size": 3.5}
+            )
+            name = filter_words(one.filter)
+            curves.append(Curve(t, np.maximum(y, 1e-4), _tint(one.filter), name, look, not nees))
+            drawn[one.filter] = f"{mean[one.filter]:.2f}"
     used = first.times[np.isfinite(first.nis)]
-    if len(used) > 2:
-        mark_gaps(ax, used, max(PAUSE * float(np.median(np.diff(used))), 1.0))
-    finish(fig, "time (s)", "NEES of the position" if what == "nees" else "NIS of the detections")
+    longest = max(PAUSE * float(np.median(np.diff(used))), 1.0) if len(used) > 2 else np.inf
+    label = "NEES of the position" if nees else "NIS of the detections"
+    fig = squares_chart({label: curves}, dof, (used, longest))
     return _of_filters(fig, "squares", what, first, drawn, score=what.upper(), dof=f"{dof:g}")
 
 
