@@ -26,7 +26,6 @@ from wildlab.flight.card_items import (
     PARTS_SHOWN,
     ROLES,
     Choice,
-    camera_of_images,
     choose_roles,
     clock_of_images,
     has_place,
@@ -36,13 +35,14 @@ from wildlab.flight.card_items import (
     span_of,
 )
 from wildlab.flight.files import dump_toml, is_safe_name, printable, read_toml
-from wildlab.flight.heights import NO_GRID, HeightPlan, HeightUse, choose_reference
 from wildlab.flight.importing import import_flight
 from wildlab.flight.manifest import CameraPart, TerrainSays
-from wildlab.flight.readers.clicks import note_of_kinds
-from wildlab.flight.readers.log import PARTS, Stream
+from wildlab.flight.readers.labels import note_of_kinds
+from wildlab.flight.readers.log import PARTS, RawLog, Stream
+from wildlab.flight.readers.photos import camera_of
 from wildlab.flight.schema import QUATERNION
 from wildlab.flight.store import Flight
+from wildlab.flight.terrain import NO_GRID, HeightPlan, HeightUse, choose_reference
 from wildlab.paths import DATA
 
 #: Rows that can be used.
@@ -167,10 +167,8 @@ class Proposal:
         if "poses" not in self.data and "gnss" not in self.data:
             left_out = [one for one in self.notes if one.startswith("The images are left out")]
             because = f" ({left_out[0]})" if left_out else ""
-            raise WildlabError(
-                f"nothing here says where a camera was{because}",
-                "add its log (--role FILE=own)",
-            )
+            problem = f"nothing here says where a camera was{because}"
+            raise WildlabError(problem, "add its log (--role FILE=own)")
         self.data = {key: self.data[key] for key in ORDER if key in self.data} | self.data
 
     @property
@@ -182,7 +180,7 @@ class Proposal:
                 role = one.role + (f" {one.target}" if one.target else "")
                 lines.append(_comment(f"{one.item.shown}: {role} ({one.why})"))
         lines += map(_comment, self.notes)
-        return "\n".join(lines) + "\n\n" + dump_toml(self.data, inline=True)
+        return "\n".join(lines) + "\n\n" + dump_toml(self.data)
 
     def _only(self, role: str) -> Choice | None:
         """The one thing of a role that only one can have; of several the one with the most rows."""
@@ -316,7 +314,7 @@ class Proposal:
             for one in self.by_role["images"]
             if one.item.name != images.item.name
         ]
-        camera, how = camera_of_images(images.item, wishes.camera, wishes.focal_px)
+        camera, how = camera_of(images.item.log or RawLog({}), wishes.camera, wishes.focal_px)
         if camera is None:
             self.notes.append(f"The images are left out: {how}. Give --camera or --focal.")
             return
@@ -482,7 +480,7 @@ class Proposal:
         """How good poses are, where not each of them says so itself: positions by the receivers' own
         statements where there are any."""
         if any("spreads" not in one for one in self.data.get("poses", {}).values()):
-            found, stated = read_assumed("uncertainty"), []
+            found = read_assumed("uncertainty")
             for way in ("horizontal", "vertical"):
                 name = f"sd_{way}_m"
                 values = [s.columns[name][s.used] for s in self.streams.values() if name in s.columns]
@@ -490,21 +488,9 @@ class Proposal:
                 every = every[np.isfinite(every) & (every > 0)]
                 if len(every):
                     found[f"position_{way}_m"] = round(float(np.median(every)), 4)
-                    stated.append(f"position {way}")
-            if stated:
-                found["note"] = (
-                    f"{' and '.join(stated).capitalize()}: as the receiver states. The rest: " + found["note"]
-                )
-            said = (
-                f"Assumed: pixels to {found['pixel_px']:g} px, tilt to "
-                f"{found['tilt_deg']:g} deg, heading to {found['heading_deg']:g} deg"
-            )
-            if "position horizontal" not in stated:
-                level, height = found["position_horizontal_m"], found["position_vertical_m"]
-                said += f", positions to {level:g} m ({height:g} m in height)"
-            said += ": see [uncertainty]."
+            found["note"] = f"Positions as the receivers state, where they do. The rest: {found['note']}"
             self.data["uncertainty"] = found | self.data.get("uncertainty", {})
-            self.notes.append(said)
+            self.notes.append("Standard deviations that no log states are assumed: see [uncertainty].")
         if "imu" in self.data:
             self.notes.append("[imu] assumes a typical sensor.")
 

@@ -28,12 +28,10 @@ from wildlab.flight.raw_files import RAW_LIMIT, match_images
 from wildlab.flight.readers import FOLDERS, FORMATS, HEAD, read_folder, read_log, recognise
 from wildlab.flight.readers.frames.image import SUFFIXES
 from wildlab.flight.readers.log import RawLog, Stream
-from wildlab.flight.readers.photos import camera_of, of_camera
+from wildlab.flight.readers.photos import of_camera
 from wildlab.flight.readers.text import header_of
-from wildlab.geometry.frames import geodetic_to_ned
+from wildlab.geometry.frames import Array, geodetic_to_ned
 from wildlab.names import listed
-
-Array = NDArray[np.float64]
 
 #: Endings of images, in small letters.
 IMAGES = frozenset(SUFFIXES)
@@ -310,15 +308,11 @@ def choose_roles(found: Sequence[CardItem], stated: Mapping[str, str]) -> list[C
 def _copies(found: Sequence[CardItem]) -> Iterator[tuple[CardItem, CardItem]]:
     """Files whose every row is in another one of the same format, a copy or a part of it; and that other."""
     logs = [one for one in found if one.log is not None and one.log.parts.keys() & COPIED]
-    logs.sort(key=_rows, reverse=True)
+    logs.sort(key=lambda one: sum(map(len, one.log.parts.values())) if one.log else 0, reverse=True)
     for number, one in enumerate(logs):
         whole = next((other for other in logs[:number] if _within(one, other)), None)
         if whole is not None:
             yield one, whole
-
-
-def _rows(one: CardItem) -> int:
-    return sum(len(part) for part in one.log.parts.values()) if one.log else 0
 
 
 def _within(one: CardItem, other: CardItem) -> bool:
@@ -413,7 +407,9 @@ def _own(open_: Sequence[CardItem], images: CardItem | None) -> tuple[CardItem |
         "is of a vehicle that flies": _flies,
         "goes up and down by more than 15 m": lambda one: _climb(one) > ON_BOARD_M,
     }
-    best = max(open_, key=lambda one: (*(holds(one) for holds in signs.values()), _duration(one)))
+    best = max(
+        open_, key=lambda one: (*(holds(one) for holds in signs.values()), np.ptp(span_of(one) or (0.0, 0.0)))
+    )
     said = [sign for sign, holds in signs.items() if holds(best)]
     return best, f"of {len(open_)} logs it {listed(said) or 'is the longest'} (--role says otherwise)"
 
@@ -534,11 +530,6 @@ def way_of(one: CardItem, *stamped: tuple[str, str]) -> LoggedPath | None:
     return None
 
 
-def _level(place: Array, origin: tuple[float, float, float]) -> Array:
-    """(N, 3) metres from the origin, of latitudes and longitudes."""
-    return geodetic_to_ned(place[:, 0], place[:, 1], np.zeros(len(place)), origin)
-
-
 def _distance(mine: LoggedPath, theirs: LoggedPath) -> tuple[float, float]:
     """Median level distance at their times, and median height of mine above them, m; NaN: not comparable."""
     order = np.argsort(mine.times)
@@ -546,7 +537,9 @@ def _distance(mine: LoggedPath, theirs: LoggedPath) -> tuple[float, float]:
     if not both.any():
         return math.inf, math.nan
     origin = (float(mine.place[0, 0]), float(mine.place[0, 1]), 0.0)
-    a, b = (_level(one.place, origin) for one in (mine, theirs))
+    a, b = (
+        geodetic_to_ned(one.place[:, 0], one.place[:, 1], 0.0 * one.times, origin) for one in (mine, theirs)
+    )
     at = np.column_stack(
         [np.interp(theirs.times[both], mine.times[order], a[order, axis]) for axis in (0, 1)]
     )
@@ -571,11 +564,6 @@ def span_of(
             if len(times):
                 return float(times.min()), float(times.max())
     return None
-
-
-def _duration(one: CardItem) -> float:
-    span = span_of(one)
-    return span[1] - span[0] if span else 0.0
 
 
 def _overlap(a: Span | None, b: Span | None) -> float:
@@ -681,48 +669,6 @@ def one_camera(
     return replace(images, log=of_camera(images.log, chosen)), chosen, note
 
 
-def camera_of_images(
-    images: CardItem, stated: CameraPart | None, focal_px: float | None = None
-) -> tuple[CameraPart | None, str]:
-    """The camera that took the images and how it is known, in a clause; or None and why it is not.
-
-    What the user states, the camera or its focal length alone, counts for more than the tags.
-    """
-    if images.log is None:
-        return None, images.problem
-    columns = images.log.parts["photos"].columns
-    sizes = np.column_stack([columns["width_px"], columns["height_px"]])
-    sizes = np.unique(sizes[np.isfinite(sizes).all(axis=1)], axis=0)
-    if stated is not None:
-        own = (stated.width_px, stated.height_px)
-        if len(sizes) and (sizes != own).any():
-            seen = ", ".join("{:.0f} x {:.0f}".format(*one) for one in sizes[:4])
-            return None, f"the stated camera has {own[0]} x {own[1]} px, and they have {seen}"
-        return stated, "as you stated it"
-    if focal_px is not None:
-        if len(sizes) != 1:
-            return None, "they are of several sizes" if len(sizes) else "nothing says how large they are"
-        names = {str(one) for one in columns.get("camera", ())} - {""}
-        found: dict[str, Any] | None = {
-            **{"camera": names.pop() if len(names) == 1 else "", "focal_px": focal_px},
-            **{"width_px": int(sizes[0, 0]), "height_px": int(sizes[0, 1]), "how": "as you stated it"},
-        }
-    else:
-        try:
-            found = camera_of(images.log)
-        except WildlabError as error:
-            return None, error.problem
-    if found is None:
-        return None, "no tag has the focal length in pixels"
-    width, height, focal = found["width_px"], found["height_px"], found["focal_px"]
-    camera = CameraPart(
-        **{"name": found["camera"] or "not stated", "width_px": width, "height_px": height},
-        **{"fx_px": focal, "fy_px": focal, "cx_px": (width - 1) / 2, "cy_px": (height - 1) / 2},
-    )
-    how = f"{width} x {height} px, focal length {focal:.0f} px ({found['how']})"
-    return camera, f"{how}; a central principal point, no distortion"
-
-
 def clock_of_images(
     images: CardItem,
     own: CardItem | None,
@@ -791,7 +737,7 @@ def _by_triggers(photos: Stream, name: str, triggers: Stream) -> ImageClock | No
     )
 
 
-def _known(column: NDArray[Any] | None) -> NDArray[np.float64]:
+def _known(column: NDArray[Any] | None) -> Array:
     if column is None:
         return np.empty(0)
     values = np.asarray(column, float)

@@ -7,18 +7,17 @@ from __future__ import annotations
 
 import math
 from datetime import UTC, datetime
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from pydantic import BaseModel
 
 from wildlab.errors import WildlabError
 from wildlab.flight.calibration_files import read_camera, read_learnt, refuse_other_camera
 from wildlab.flight.checks.check import find
+from wildlab.flight.checks.findings import part_of
 from wildlab.flight.clocks import between, poses_at
 from wildlab.flight.files import TOML_LIMIT, check_model, inside
 from wildlab.flight.manifest import (
@@ -41,10 +40,11 @@ from wildlab.flight.recipe_tables import (
     read_sensors,
     read_truth,
 )
-from wildlab.flight.recipes import Recipe, read_recipe
+from wildlab.flight.recipes import Block, Recipe, read_recipe
 from wildlab.flight.schema import POSITION
 from wildlab.flight.store import Flight, save_flight
 from wildlab.flight.terrain import lay_terrain
+from wildlab.geometry.frames import Array
 
 #: Parts that a manifest has as the recipe states them.
 _AS_STATED = (
@@ -197,39 +197,27 @@ def _camera(recipe: Recipe, raw: RawFiles) -> CameraPart | None:
         Where a column is missing or does not hold one constant, or a number makes no camera; or the camera's
         own file is missing or wrong.
     """
-    if recipe.camera_file is not None:
-        raw.read(recipe.camera_file, "camera", TOML_LIMIT)
-        return read_camera(raw.folder / recipe.camera_file).camera
-    block = recipe.camera
-    if block is None:
+    if recipe.camera is None:
         return None
-    data: dict[str, object] = {name: getattr(block, name) for name in CameraPart.model_fields}
-    path = raw.recipe
-    if block.file is not None:
-        rows = raw.table(block.file, block.separator, "camera", decimal=block.decimal)
-        for name, column in block.columns.items():
+    if isinstance(recipe.camera, str):
+        raw.read(recipe.camera, "camera", TOML_LIMIT)
+        return read_camera(raw.folder / recipe.camera).camera
+    data, rows, columns = dict(recipe.camera), None, {}
+    if stated := {key: data.pop(key) for key in Block.model_fields if key in data}:
+        rows = raw.table(check_model(Block, stated, raw.recipe), "camera")
+        columns = {name: one for name, one in data.items() if isinstance(one, str) and name != "name"}
+        for name, column in columns.items():
             found = plain_numbers(rows, column, f"camera.{name}")
-            rows.refuse(
-                found != found[0],
-                partial(_camera_changes, found),
-                "import each camera or zoom by itself",
-                column,
-                f"camera.{name}",
-            )
+            fix = "import each camera or zoom by itself"
+            rows.refuse(found != found[0], "the camera changes", fix, column, f"camera.{name}")
             data[name] = float(found[0])
     try:
-        return check_model(CameraPart, data, path)
+        return check_model(CameraPart, data, raw.recipe)
     except WildlabError as error:
         name = error.field or ""
-        named = block.columns.get(name)
-        if named is None or block.file is None:
-            raise WildlabError(error.problem, error.fix, file=path, field=f"camera.{name}") from None
-        rows = raw.table(block.file, block.separator, "camera", decimal=block.decimal)
-        raise rows.fail(error.problem, error.fix, named, f"camera.{name}", 0) from None
-
-
-def _camera_changes(found: NDArray[np.float64], row: int) -> str:
-    return f"the camera changes: {found[row]:g} here, {found[0]:g} before"
+        if rows is None or name not in columns:
+            raise WildlabError(error.problem, error.fix, file=raw.recipe, field=f"camera.{name}") from None
+        raise rows.fail(error.problem, error.fix, columns[name], f"camera.{name}", 0) from None
 
 
 def _places(recipe: Recipe, poses: dict[str, Rows], sensors: dict[str, Rows]) -> LocalFrame:
@@ -249,9 +237,7 @@ def _places(recipe: Recipe, poses: dict[str, Rows], sensors: dict[str, Rows]) ->
     return LocalFrame(origin, vertical.correction_m, vertical.taken_off)
 
 
-def _positions_of_receiver(
-    recipe: Recipe, tables: dict[str, pd.DataFrame], times: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _positions_of_receiver(recipe: Recipe, tables: dict[str, pd.DataFrame], times: Array) -> Array:
     """Where the receiver was, (N, 3), for poses without positions of their own."""
     if recipe.gnss is None:
         raise ValueError("poses without positions")
@@ -277,7 +263,7 @@ def _pose_times(
     recipe: Recipe,
     raw: RawFiles,
     name: str,
-) -> NDArray[np.float64]:
+) -> Array:
     """Flight time of each pose: its own stamp, or that of its frame."""
     if poses.stamps is not None:
         return np.asarray((poses.stamps - start) / 1e9)
@@ -334,26 +320,23 @@ def _manifest(
 
 def _refuse_problems(flight: Flight, recipe: Recipe, folder: Path) -> None:
     """Raise the first problem that `check_flight` finds, in terms of the raw file it comes from."""
+    blocks: dict[str, list[Any]] = {
+        **{name: [one] for name, one in recipe.on_board.items()},
+        **{f"nav/{name}": [one] for name, one in recipe.poses.items()},
+        "frames": [] if recipe.frames is None else [recipe.frames],
+        "truth": [*recipe.truth],
+        "detections": [*recipe.detections],
+    }
     for finding in find(flight, meaning=False):
         if finding.level != "problem":
             continue
-        sensor = recipe.on_board.get(finding.table)
-        if sensor is not None:
-            part, files = finding.table, [sensor.file]
-        elif finding.table.startswith("nav/"):
-            name = finding.table.removeprefix("nav/")
-            part, files = f"poses.{name}", [recipe.poses[name].file]
-        elif finding.table == "frames":
-            part, files = "frames", [recipe.frames.file] if recipe.frames else []
-        else:
-            blocks = recipe.truth if finding.table == "truth" else recipe.detections
-            part, files = finding.table, [block.file for block in blocks]
-            if finding.code == "all-truth-far":  # either may be the wrong one
-                part, files = "poses] or [truth", [*(one.file for one in recipe.poses.values()), *files]
+        part, used = part_of(finding.table), blocks.get(finding.table, [])
+        if finding.code == "all-truth-far":  # either may be the wrong one
+            part, used = "poses] or [truth", [*recipe.poses.values(), *used]
         raise WildlabError(
             finding.clause,
             finding.remedy,
-            file=" and ".join(dict.fromkeys(str(folder / _file(recipe, name)) for name in files)),
+            file=" and ".join(dict.fromkeys(str(folder / _file(recipe, one.file)) for one in used)),
             field=f"{finding.field} (from [{part}])",
         )
 

@@ -8,14 +8,12 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from wildlab.flight.checks.findings import (
     NORM_TOLERANCE,
 )
 from wildlab.flight.clocks import covariance_columns
 from wildlab.flight.raw_files import (
-    Array,
     Nanoseconds,
     RawFiles,
     RawTable,
@@ -25,6 +23,7 @@ from wildlab.flight.raw_files import (
     texts,
     times,
 )
+from wildlab.flight.readers.log import named
 from wildlab.flight.recipes import (
     FORMS,
     Attitude,
@@ -47,6 +46,9 @@ from wildlab.flight.schema import POSITION, QUATERNION, VELOCITY, Dimension
 from wildlab.geometry.attitude_uncertainty import pose_covariance, tilt_from_roll_pitch
 from wildlab.geometry.frames import (
     R_NED_ENU,
+    Array,
+    Indices,
+    Mask,
     Origin,
     enu_to_ned,
     euler_to_matrix,
@@ -94,16 +96,6 @@ class LocalFrame:
         return enu_to_ned(np.column_stack([a, b, c - off]))
 
 
-def ned_columns(position: Array) -> dict[str, Array]:
-    """Positions (N, 3) in n as columns of a flight."""
-    return dict(zip(POSITION, position.T, strict=True))
-
-
-def velocity_columns(velocity: Array) -> dict[str, Array]:
-    """Velocities (N, 3) in n as columns of a flight."""
-    return dict(zip(VELOCITY, velocity.T, strict=True))
-
-
 @dataclass(frozen=True)
 class Rows:
     """One table without its times and places.
@@ -130,7 +122,7 @@ class Rows:
 
     def table(self, time_s: Array, position: Array | None) -> pd.DataFrame:
         """The table of the flight, with positions (N, 3) in n where it has any."""
-        placed = {} if position is None else ned_columns(position)
+        placed = {} if position is None else named(POSITION, position.T)
         return pd.DataFrame({"time_s": time_s} | placed | self.columns)
 
 
@@ -233,10 +225,14 @@ def read_poses(recipe: Recipe, block: Poses, table: RawTable, part: str, ids: Te
         )
         velocity = None if velocity is None else velocity[first]
         spreads = None if spreads is None else spreads[first]
-    rotation = _rotation(attitude, block.attitude)
-    columns: dict[str, Any] = dict(zip(QUATERNION, matrix_to_quaternion(rotation).T, strict=True))
+    rotation = (
+        euler_to_matrix(*attitude.T) if block.attitude.quaternion is None else quaternion_to_matrix(attitude)
+    )
+    if block.attitude.axes == "flu-enu":
+        rotation = R_NED_ENU @ rotation @ FLIP
+    columns: dict[str, Any] = named(QUATERNION, matrix_to_quaternion(rotation).T)
     if velocity is not None:
-        columns |= velocity_columns(velocity)
+        columns |= named(VELOCITY, velocity.T)
     if ids is not None:
         columns["frame_id"] = ids
     if spreads is not None:
@@ -267,12 +263,6 @@ def _read_attitude(table: RawTable, attitude: Attitude, part: str) -> Array:
     return q * np.array([1, -1, -1, -1]) if attitude.inverse else q
 
 
-def _rotation(values: Array, attitude: Attitude) -> Array:
-    """``R_nb`` (N, 3, 3)."""
-    R = quaternion_to_matrix(values) if attitude.quaternion is not None else euler_to_matrix(*values.T)
-    return R_NED_ENU @ R @ FLIP if attitude.axes == "flu-enu" else R
-
-
 def _read_spreads(table: RawTable, spreads: Spreads, part: str) -> Array:
     """(N, 4) standard deviations: horizontal and vertical position, tilt and heading."""
 
@@ -286,7 +276,7 @@ def _read_spreads(table: RawTable, spreads: Spreads, part: str) -> Array:
     return np.column_stack([*lengths, tilt, heading])
 
 
-def _rows_of_frames(ids: Text) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _rows_of_frames(ids: Text) -> tuple[Indices, Indices]:
     """For each row the number of its frame, and for each frame its first row."""
     frame, _ = pd.factorize(ids)
     _, first = np.unique(frame, return_index=True)
@@ -295,9 +285,9 @@ def _rows_of_frames(ids: Text) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 
 def _refuse_differing(
     table: RawTable,
-    differs: NDArray[np.bool_],
-    frame: NDArray[np.intp],
-    first: NDArray[np.intp],
+    differs: Mask,
+    frame: Indices,
+    first: Indices,
     ids: Text,
     column: str,
     part: str,
@@ -319,8 +309,8 @@ def _yaw_from_bearing(
     bearing: YawFromBearing,
     part: str,
     position: RawPosition,
-    frame: NDArray[np.intp],
-    first: NDArray[np.intp],
+    frame: Indices,
+    first: Indices,
 ) -> tuple[Array, str]:
     """Yaw of each frame (circular mean over its rows), and a sentence about how well the rows agree."""
     latitude = numbers(table, bearing.latitude, "angle", f"{part}.latitude")
@@ -413,7 +403,7 @@ def read_sensors(recipe: Recipe, raw: RawFiles) -> dict[str, Rows]:
         if isinstance(block, Satellite):
             position = read_position(rows, block.position, "gnss.position")
             if block.velocity is not None:
-                columns = velocity_columns(read_velocity(rows, block.velocity, "gnss.velocity"))
+                columns = named(VELOCITY, read_velocity(rows, block.velocity, "gnss.velocity").T)
         columns |= read_columns(rows, block, name, ON_BOARD[name], may_be_empty=name == "gnss")
         for key in ("satellites", "fix") if isinstance(block, Satellite) else ():
             if (column := getattr(block, key)) is not None:
@@ -547,7 +537,7 @@ def read_detections(
         columns["v_px"] = numbers(rows, block.pixel.v, "pixel", f"{part}.pixel.v", image=image)
     elif block.position is not None:
         position = places.ned(read_position(rows, block.position, f"{part}.position"), "positions")
-        columns |= ned_columns(position)
+        columns |= named(POSITION, position.T)
     elif block.azimuth is not None:
         azimuth = numbers(rows, block.azimuth, "angle", f"{part}.azimuth")
         if block.counts_from == "bow":
@@ -622,5 +612,5 @@ def read_truth(
         time_s = (times(rows, block.time, f"{part}.time", recipe.time.zone, recipe.time.epoch) - start) / 1e9
     position = places.ned(read_position(rows, block.position, f"{part}.position"), "truth")
     columns: dict[str, Text | Array] = {"target_id": names, "time_s": time_s}
-    columns |= ned_columns(position) | read_columns(rows, block, part, _SPREADS, may_be_empty=True)
+    columns |= named(POSITION, position.T) | read_columns(rows, block, part, _SPREADS, may_be_empty=True)
     return pd.DataFrame(columns)

@@ -2,31 +2,29 @@
 
 A node of the grid at north N and east E has the height of the point of the map's surface that has these very
 coordinates in n. Where that lies in the map depends on how deep it is, a little: n's verticals are parallel,
-the Earth's are not. So its depth is sought by iteration, which gains three digits a turn, between two depths.
+the Earth's are not. So its depth is sought by iteration, which gains three digits a turn.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from wildlab.errors import WildlabError
-from wildlab.flight.heights import undulation
 from wildlab.flight.manifest import TerrainPart, TerrainSays, replace_in_manifest
+from wildlab.flight.readers.log import Stream
 from wildlab.flight.readers.terrain import ElevationMap, Heights, open_elevation
 from wildlab.flight.schema import POSITION
 from wildlab.flight.store import MOST_NODES, Flight
-from wildlab.geometry.frames import Origin, geodetic_to_ned, ned_to_geodetic
+from wildlab.geometry.frames import Array, Indices, Mask, Origin, geodetic_to_ned, ned_to_geodetic
 from wildlab.geometry.terrain import Terrain
-
-Array = NDArray[np.float64]
+from wildlab.names import listed
 
 #: Nodes of the grid that are worked on at once.
 AT_ONCE = 1_000_000
@@ -94,15 +92,6 @@ def places_of(elevation: ElevationMap, origin: Origin, added: float) -> MapPlace
     return MapPlaces(elevation, origin, added, there.transform, back.transform)
 
 
-def depths_of(places: MapPlaces, extent: Extent, heights: tuple[float, float]) -> tuple[float, float]:
-    """Down (m) above and below all ground over an extent, whose heights in the map are the lowest and the
-    highest."""
-    high = -(heights[1] + places.added - places.origin[2]) - 10.0
-    # The ground falls behind the horizon: down grows by the square of the distance over twice the radius.
-    far = max(map(abs, extent)) ** 2 / 6e6
-    return high, -(heights[0] + places.added - places.origin[2]) + far + 10.0
-
-
 def resample(
     heights: Heights, corner: tuple[int, int], every: int, places: MapPlaces, extent: Extent, step: float
 ) -> Terrain:
@@ -132,31 +121,18 @@ def resample(
     columns = int(np.floor((extent.far_east - extent.east) / step)) + 1
     out = np.empty((rows, columns), np.float32)
     east = extent.east + step * np.arange(columns)
-    downs = depths_of(places, extent, (float(np.nanmin(heights)), float(np.nanmax(heights))))
+    middle = places.origin[2] - places.added - float(np.nanmean(heights))
     at_once = max(1, AT_ONCE // columns)
     for first in range(0, rows, at_once):
         north = extent.north + step * np.arange(first, min(first + at_once, rows))
         N, E = (grid.ravel() for grid in np.meshgrid(north, east, indexing="ij"))
-        ends = [places.of_points(np.column_stack([N, E, np.full(N.size, down)])).T for down in downs]
-        out[first : first + len(north)] = _surface(heights, corner, every, ends, downs).reshape(-1, columns)
+        p = np.column_stack([N, E, np.full(N.size, middle)])
+        for _ in range(3):
+            column, row, height = places.of_points(p).T
+            ground = bilinear(heights, (row - corner[0]) / every - 0.5, (column - corner[1]) / every - 0.5)
+            p[:, 2] += np.nan_to_num(height - ground)
+        out[first : first + len(north)] = np.where(np.isnan(ground), np.nan, -p[:, 2]).reshape(-1, columns)
     return Terrain(out, extent.north, extent.east, step)
-
-
-def _surface(
-    heights: Heights, corner: tuple[int, int], every: int, ends: list[Array], downs: tuple[float, float]
-) -> Array:
-    """Heights in n (N,), metres above the plane ``down = 0``, of verticals with ends (3, N) at two depths:
-    columns, rows and heights in the map, linear between."""
-    top, bottom = ends
-    share = np.full(top.shape[1], 0.5)
-    for _ in range(3):
-        column, row, _height = top + share * (bottom - top)
-        found = bilinear(heights, (row - corner[0]) / every - 0.5, (column - corner[1]) / every - 0.5)
-        share = (found - top[2]) / (bottom[2] - top[2])
-        known = np.isfinite(share)
-        share[~known] = 0.5
-    down = downs[0] + share * (downs[1] - downs[0])
-    return np.where(known, -down, np.nan)
 
 
 def bilinear(heights: Heights, rows: Array, columns: Array) -> Array:
@@ -167,7 +143,7 @@ def bilinear(heights: Heights, rows: Array, columns: Array) -> Array:
 
 
 def resampling_error(
-    terrain: Terrain, places: MapPlaces, cells: NDArray[np.int64], heights: Heights
+    terrain: Terrain, places: MapPlaces, cells: Indices, heights: Heights
 ) -> tuple[float, float]:
     """How far a grid in n lies from the map's own nodes: root mean square, and the largest, metres.
 
@@ -251,10 +227,11 @@ def lay_terrain(flight: Flight, path: Path, says: TerrainSays) -> Flight:
     if margin is None:
         margin = float(np.clip(HEIGHTS_ABOVE * max(above, default=0.0), LEAST, MOST))
     cut = _cut_out(places, positions, margin, says)
+    code = elevation.whole.to_authority(min_confidence=70)
     record = TerrainPart(
         source=path.name,
         sha256=elevation.digest,
-        crs=_named(elevation),
+        crs=":".join(code) if code is not None else elevation.whole.name[:100],
         heights=heights,
         added_m=added,
         unit=elevation.unit,
@@ -350,7 +327,7 @@ def _cut_out(places: MapPlaces, positions: Array, margin: float, says: TerrainSa
     return CutOut(terrain, cell, every, rms, largest)
 
 
-def _positions(flight: Flight) -> tuple[Array, NDArray[np.bool_]]:
+def _positions(flight: Flight) -> tuple[Array, Mask]:
     """Where the flight and what it saw were, (N, 3) m, and which of these are poses."""
     poses = [table[POSITION].to_numpy(float) for table in flight.nav.values()]
     truth = [] if flight.truth is None else [flight.truth[POSITION].to_numpy(float)]
@@ -519,22 +496,14 @@ def _refuse_elsewhere(
     also: str = "the flight's origin",
 ) -> None:
     """Refuse a map that no position of the flight lies over, and say how far off it is."""
-    rows, columns = places.map.shape
-
-    def over(found: Array) -> bool:
-        inside = (found[:, 0] >= 0) & (found[:, 0] <= columns) & (found[:, 1] >= 0) & (found[:, 1] <= rows)
-        return bool(inside.any())
-
-    found = places.of_points(positions)
-    if over(found):
+    corner = np.array(places.map.shape[::-1], float)
+    found = places.of_points(positions)[:, :2]
+    if ((found >= 0) & (found <= corner)).all(axis=1).any():
         return
     middle = len(found) // 2
-    column, row = (columns / 2, rows / 2) if np.isnan(found[middle, :2]).any() else found[middle, :2]
-    nearest = np.clip([[column, row]], [0, 0], [columns, rows])
-    away = places.of_cells(nearest, np.zeros(1))[0, :2] - positions[middle, :2]
-    distance = float(np.hypot(*away))
-    far = f"{distance / 1000:,.1f} km away" if distance >= 1000 else f"{distance:.0f} m away"
-    far = far if math.isfinite(distance) else "beyond the reach of its own CRS"
+    nearest = np.clip(np.nan_to_num(found[middle], nan=0.0), 0.0, corner)
+    away = places.of_cells(nearest[None], np.zeros(1))[0, :2] - positions[middle, :2]
+    far = f"{np.hypot(*away) / 1000:,.1f} km away"
     raise WildlabError(
         f"{what} over this map, whose nearest cell is {far}",
         f"give another map, or check CRS and {also}",
@@ -543,7 +512,248 @@ def _refuse_elsewhere(
     )
 
 
-def _named(elevation: ElevationMap) -> str:
-    """A short name of a CRS: its code, or what it calls itself."""
-    code = elevation.whole.to_authority(min_confidence=70)
-    return ":".join(code) if code is not None else elevation.whole.name[:100]
+# -- what heights count from, and how those of several logs are brought to one reference, never by a guess
+
+#: Heights above the geoid of EGM96, and what to do where PROJ's grid of it is not there.
+EGM96 = "EPSG:4326+5773"
+NO_GRID = "no grid of EGM96 is installed (`projsync --file us_nga_egm96_15`)"
+#: The geoid is nowhere further from the ellipsoid than this, m.
+FARTHEST_M = 110.0
+#: A column of heights is there where so large a share of the rows used has it.
+MOST_ROWS = 0.9
+
+_COUNTED = {
+    "height_ellipsoid_m": "the ellipsoid",
+    "height_sea_m": "sea level",
+    "height_home_m": "take-off",
+}
+
+
+class HeightUse(NamedTuple):
+    """Which heights of a stream are used: the column, m to add to each, and why, in a clause."""
+
+    column: str
+    add_m: float
+    reason: str
+
+
+class HeightPlan(NamedTuple):
+    """One reference for the heights of a flight.
+
+    Attributes
+    ----------
+    reference
+        What they all count from then.
+    uses
+        By the streams' names.
+    without
+        Names of streams that have places and no heights.
+    """
+
+    reference: str
+    uses: dict[str, HeightUse]
+    without: tuple[str, ...] = ()
+
+
+def undulation(latitude_deg: float, longitude_deg: float, heights: Any = EGM96) -> float | None:
+    """How far that which heights count from is above the ellipsoid of WGS84 at a place, by a grid of PROJ.
+
+    Parameters
+    ----------
+    latitude_deg, longitude_deg
+        Of WGS84.
+    heights
+        A CRS with heights.
+
+    Returns
+    -------
+    m; None where no grid is installed, or it does not reach there. Nothing is fetched.
+    """
+    from pyproj import CRS, Transformer
+    from pyproj.exceptions import ProjError
+
+    crs = CRS.from_user_input(heights)
+    try:
+        flat = Transformer.from_crs(CRS.from_epsg(4326), crs.to_2d(), always_xy=True)
+        up = Transformer.from_crs(crs, CRS.from_epsg(4979), always_xy=True, allow_ballpark=False)
+        found = float(up.transform(*flat.transform(longitude_deg, latitude_deg), 0.0)[2])
+    except ProjError:  # no grid, or a file that is none
+        return None
+    return found if np.isfinite(found) and abs(found) <= FARTHEST_M else None
+
+
+def choose_reference(
+    streams: Mapping[str, Stream],
+    own: Collection[str] = (),
+    geoid_m: float | None = None,
+    home_sea_m: float | None = None,
+) -> HeightPlan:
+    """One reference for heights: the ellipsoid where all streams can get there, else sea level, else refused.
+
+    From sea level to the ellipsoid leads the geoid's height: as stated, else as a receiver of these streams
+    logged it (the stream's own first), else PROJ's grid. From take-off to sea level leads the first used fix
+    of the own flight, or what is stated.
+
+    Parameters
+    ----------
+    streams
+        By a name for messages; those without places and heights are passed over.
+    own
+        Names of the streams of one vehicle: heights above take-off are tied by these alone.
+    geoid_m
+        Height of the geoid above the ellipsoid there, stated, m.
+    home_sea_m
+        Height of the take-off above sea level, stated, m.
+
+    Returns
+    -------
+    HeightPlan
+        No sentence in it says how high the geoid is: that tells of a place.
+
+    Raises
+    ------
+    WildlabError
+        Where there is no one reference for all; it names streams, and what to state.
+    """
+    there = {name: _columns(stream) for name, stream in streams.items()}
+    names = [name for name in streams if there[name]]
+    ways = {
+        name: {
+            kind: HeightUse(column, 0.0, f"counts from {_COUNTED[column]}")
+            for kind in ("ellipsoid", "sea")
+            if (column := f"height_{kind}_m") in there[name]
+        }
+        for name in names
+    }
+    for name in names:
+        if not ways[name]:
+            tied = _tie(name, streams, there, [one for one in own if one in names], home_sea_m)
+            if name in own and tied is not None:
+                ways[name][tied[0]] = tied[1]
+    homeless = [name for name in names if not ways[name]]
+    if homeless:
+        raise WildlabError(
+            f"the heights of {listed(homeless)} count from take-off of unknown height",
+            "state the take-off's height above sea level",
+            field="heights",
+        )
+    geoid = {name: _geoid(name, streams, geoid_m) for name in names}
+    for name in names:
+        found = geoid[name]
+        if found is None:
+            continue
+        way = ways[name]
+        for has, lacks, sign, done in (
+            ("sea", "ellipsoid", 1, "added"),
+            ("ellipsoid", "sea", -1, "taken off"),
+        ):
+            if lacks not in way:
+                reason = f"{way[has].reason}, and the geoid's height {found[1]} is {done}"
+                way[lacks] = way[has]._replace(add_m=way[has].add_m + sign * found[0], reason=reason)
+    for reference in ("ellipsoid", "sea"):
+        if all(reference in ways[name] for name in names):
+            return HeightPlan(
+                reference, {name: ways[name][reference] for name in names}, tuple(streams.keys() - names)
+            )
+    low = [name for name in names if "ellipsoid" not in ways[name]]
+    high = [name for name in names if "sea" not in ways[name]]
+    raise WildlabError(
+        f"the heights of {listed(low)} count from sea level, those of {listed(high)} from the ellipsoid",
+        f"state the geoid's height above the ellipsoid; {NO_GRID}",
+        field="heights",
+    )
+
+
+def _columns(stream: Stream) -> list[str]:
+    """Columns of heights that most of the rows used have, or of all rows where none is used."""
+    rows = stream.used if stream.used.any() else np.ones(len(stream), bool)
+    return [
+        name
+        for name in _COUNTED
+        if name in stream.columns and len(stream) and np.isfinite(_of(stream, name)[rows]).mean() >= MOST_ROWS
+    ]
+
+
+def _of(stream: Stream, column: str) -> Array:
+    return np.asarray(stream.columns[column], float)
+
+
+def _geoid(name: str, streams: Mapping[str, Stream], stated: float | None) -> tuple[float, str] | None:
+    """The geoid's height for a stream, and where it is from."""
+    if stated is not None:
+        return stated, "as stated"
+    for other in sorted(streams, key=lambda one: one != name):
+        logged = _logged(streams[other])
+        if logged is not None:
+            return logged, f"as {'its own receiver' if other == name else other} has it"
+    stream = streams[name]
+    if {"latitude_deg", "longitude_deg"} <= stream.columns.keys():
+        rows = stream.used
+        latitude, longitude = (_of(stream, f"{axis}_deg")[rows] for axis in ("latitude", "longitude"))
+        good = np.isfinite(latitude) & np.isfinite(longitude)
+        if good.any():
+            grid = undulation(float(np.median(latitude[good])), float(np.median(longitude[good])))
+            return None if grid is None else (grid, "of EGM96")
+    return None
+
+
+def _logged(stream: Stream) -> float | None:
+    """The geoid's height as a receiver has it; None where it has none, or a placeholder."""
+    rows, columns = stream.used, stream.columns
+    if "undulation_m" in columns:
+        values = _of(stream, "undulation_m")[rows]
+        values = values[np.isfinite(values) & (np.abs(values) <= FARTHEST_M) & (values != 0)]
+        if len(values):
+            return float(np.median(values))
+    if {"height_ellipsoid_m", "height_sea_m"} <= columns.keys():
+        apart = (_of(stream, "height_ellipsoid_m") - _of(stream, "height_sea_m"))[rows]
+        apart = apart[np.isfinite(apart) & (np.abs(apart) <= FARTHEST_M)]
+        # Two columns of the very same numbers are one reference written down twice.
+        if len(apart) and (apart != 0).any():
+            return float(np.median(apart))
+    return None
+
+
+def _tie(
+    name: str,
+    streams: Mapping[str, Stream],
+    there: Mapping[str, list[str]],
+    own: list[str],
+    stated: float | None,
+) -> tuple[str, HeightUse] | None:
+    """What leads from heights above take-off to another reference."""
+    column = "height_home_m"
+    if stated is not None:
+        use = HeightUse(column, stated, "counts from take-off, as stated")
+        return "sea", use
+    home = streams[name]
+    for reference in ("sea", "ellipsoid"):
+        fixed = f"height_{reference}_m"
+        # A column that is there in too few rows to be used may still have the first fix.
+        for other in [name, *(one for one in own if one != name)]:
+            if fixed not in streams[other].columns or (other != name and fixed not in there[other]):
+                continue
+            apart = _first_fix(home, streams[other], fixed)
+            if apart is not None:
+                at = "its own first used fix" if other == name else f"the first used fix of {other}"
+                counted = _COUNTED[fixed]
+                return reference, HeightUse(column, apart, f"counts from take-off, tied to {counted} by {at}")
+    return None
+
+
+def _first_fix(home: Stream, fixes: Stream, fixed: str) -> float | None:
+    """Height of the fix minus that above take-off, at the first used fix that both know."""
+    above = np.where(home.used, _of(home, "height_home_m"), np.nan)
+    height = np.where(fixes.used, _of(fixes, fixed), np.nan)
+    if home is not fixes:
+        clocks = [
+            one for one in ("time_s", "time_log_s") if {one} <= home.columns.keys() & fixes.columns.keys()
+        ]
+        clock = next((one for one in clocks if np.isfinite(_of(home, one)[home.used]).any()), None)
+        if clock is None:
+            return None
+        known = np.isfinite(above) & np.isfinite(_of(home, clock))
+        stamps = _of(home, clock)[known]
+        above = np.interp(_of(fixes, clock), stamps, above[known], left=np.nan, right=np.nan)
+    both = np.flatnonzero(np.isfinite(above) & np.isfinite(height))
+    return float(height[both[0]] - above[both[0]]) if len(both) else None

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 from scipy.spatial.transform import Rotation
 from scipy.special import bdtrc
 
@@ -46,7 +47,7 @@ from wildlab.flight.clocks import between, frame_times, gimbal_angles, poses_at,
 from wildlab.flight.schema import POSITION
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera, normalise
-from wildlab.geometry.frames import Array, Origin, euler_to_matrix, matrix_to_euler
+from wildlab.geometry.frames import Array, Indices, Mask, Origin, euler_to_matrix, matrix_to_euler
 from wildlab.geometry.mount import R_MC_DOWN, R_MC_FORWARD, Looks, Mount, camera_pose, camera_rotation
 from wildlab.names import listed
 
@@ -109,7 +110,7 @@ class Sightings:
     p_nb: Array
     R_nb: Array
     points: Array
-    image: NDArray[np.intp]
+    image: Indices
     sd: Array
     origin: Origin
     looked: Callable[[float], SightingGeometry]
@@ -118,7 +119,7 @@ class Sightings:
     own_gimbal: bool = False
     named: bool = True
 
-    def take(self, rows: NDArray[np.bool_]) -> Sightings:
+    def take(self, rows: Mask) -> Sightings:
         """Some of the rows; the poses at other times go with them."""
 
         def looked(shift: float) -> SightingGeometry:
@@ -242,7 +243,7 @@ class Missed:
     expected: Array
 
     @property
-    def good(self) -> NDArray[np.bool_]:
+    def good(self) -> Mask:
         """Rows (N,) whose pixel has a ray."""
         return np.asarray(np.isfinite(self.turn).all(axis=1))
 
@@ -295,12 +296,9 @@ def robust_scale(size: Array) -> float:
     return float(np.median(size)) / 1.1774 if len(size) else float("nan")
 
 
-def left_over(m: Missed, fit: NDArray[np.bool_]) -> Array:
-    """Sizes (N,) of the misses less what is allowed for, in radians, by a fit to some rows.
-
-    Allowed for are a small turn of the camera and a small shift of the position: robust least squares, held
-    near zero by what is usual of both.
-    """
+def constant_of(m: Missed, fit: Mask, allowed: Array) -> tuple[Array, Array]:
+    """A small turn of the camera and a small shift of the position (6,), by robust least squares over some
+    rows, held near zero by what is allowed of both; and how misses grow with them (N, 3, 6)."""
     shift = np.cross(np.swapaxes(m.R_nc, 1, 2), m.towards[:, :, None], axisa=1, axisb=1, axisc=1)
     J = np.concatenate([m.across, shift / np.maximum(m.distance, 1.0)[:, None, None]], axis=2)
     e, expected, rows = m.turn[fit], m.expected[fit], J[fit]
@@ -309,8 +307,14 @@ def left_over(m: Missed, fit: NDArray[np.bool_]) -> Array:
         size = np.linalg.norm(e - rows @ value, axis=1)
         scale = np.maximum(robust_scale(size), expected / 3)
         weight = 1 / (1 + (size / (2 * scale)) ** 2) / scale**2
-        A = np.einsum("nia,n,nib->ab", rows, weight, rows) + np.diag(ALLOWED**-2.0)
+        A = np.einsum("nia,n,nib->ab", rows, weight, rows) + np.diag(allowed**-2.0)
         value = np.linalg.solve(A, np.einsum("nia,n,ni->a", rows, weight, e))
+    return value, J
+
+
+def left_over(m: Missed, fit: Mask) -> Array:
+    """Sizes (N,) of the misses less what is allowed for, in radians, by a fit to some rows."""
+    value, J = constant_of(m, fit, ALLOWED)
     return np.asarray(np.linalg.norm(m.turn - J @ value, axis=1))
 
 
@@ -339,12 +343,12 @@ def glance(s: Sightings) -> Array:
     return misfit(s, halves=False)[:, 0]
 
 
-def _sizes(m: Missed, fit: NDArray[np.bool_], judged: NDArray[np.bool_]) -> Array:
+def _sizes(m: Missed, fit: Mask, judged: Mask) -> Array:
     sizes = (left_over(m, fit), m.angle)
     return np.array([robust_scale((size / m.expected)[judged]) for size in sizes])
 
 
-def halves_of(groups: NDArray[np.intp]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def halves_of(groups: Indices) -> tuple[Mask, Mask]:
     """Rows of every other group (N,), and the rest: errors that drift are then the same in both."""
     first = np.searchsorted(np.unique(groups), groups) % 2 == 0
     return first, ~first
@@ -376,8 +380,8 @@ CLOCKS = np.sinh(np.linspace(-5.0, 5.0, 41)) * 0.8
 HOURS = tuple(h for h in np.arange(-14.0, 14.25, 0.25) if h)
 LEAP_S = (18.0, -18.0, 19.0, -19.0, 37.0, -37.0)
 #: A mount is off by a few degrees and no wrong meaning; beyond the second, a turn is one of the usual ones.
-TURNED_DEG, LARGEST_TURN_DEG, REFITS = 5.0, 40.0, 6
-GOLDEN = (np.sqrt(5) - 1) / 2
+TURNED_DEG, LARGEST_TURN_DEG = 5.0, 40.0
+ALLOWED_TURN = np.array([1.0] * 3 + [1e-6] * 3)
 #: A lever arm is no longer than this, m.
 LONGEST_LEVER = 5.0
 
@@ -613,11 +617,8 @@ def best_of(cost: Callable[[float], float], grid: Array) -> float:
     if not np.isfinite(costs).any():
         return 0.0
     k = int(np.nanargmin(np.where(np.isfinite(costs), costs, np.inf)))
-    low, high = float(grid[max(k - 1, 0)]), float(grid[min(k + 1, len(grid) - 1)])
-    for _ in range(12):
-        a, b = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
-        low, high = (low, b) if cost(a) < cost(b) else (a, high)
-    return (low + high) / 2
+    about = grid[max(k - 1, 0)], grid[min(k + 1, len(grid) - 1)]
+    return float(minimize_scalar(cost, bounds=about, options={"maxiter": 14}).x)
 
 
 def _cost(s: Sightings) -> float:
@@ -648,11 +649,7 @@ def height_mistakes(s: Sightings) -> Iterator[Mistake[Sightings]]:
 def turn_mistakes(s: Sightings) -> Iterator[Mistake[Sightings]]:
     """A camera that is turned against its mount by a constant, as a tilt that was not stated."""
     m = missed(s)
-    rows, across, e = m.good, m.across[m.good], np.zeros(3)
-    for _ in range(REFITS):
-        weight = _weight(np.linalg.norm(m.turn[rows] - across @ e, axis=1))
-        A = np.einsum("nij,n->ij", across, weight) + 1e-9 * np.eye(3)
-        e = np.linalg.solve(A, np.einsum("n,ni->i", weight, m.turn[rows]))
+    e = constant_of(m, m.good, ALLOWED_TURN)[0][:3]
     size = np.degrees(np.linalg.norm(e))
     if not TURNED_DEG < size < LARGEST_TURN_DEG:
         return
@@ -665,11 +662,6 @@ def turn_mistakes(s: Sightings) -> Iterator[Mistake[Sightings]]:
     tilt, pan, roll = np.degrees(e)
     facts = {"size": size, "tilt": tilt, "pan": pan, "roll": roll}
     yield mistake(one_row("constant-turn"), turned, fitted=True, **facts)
-
-
-def _weight(size: Array) -> Array:
-    """Of misses: far ones count little, since a wrong click must not shift what all others say."""
-    return 1 / (1 + (size / (2 * max(np.median(size), 1e-9))) ** 2)
 
 
 def clock_mistakes(s: Sightings, offset_s: float) -> Iterator[Mistake[Sightings]]:
@@ -781,7 +773,7 @@ def _turned(m: Missed, names: NDArray[np.object_], name: str) -> str:
     return f"{name!r} ({number(angle)} deg)"
 
 
-def _off(far: NDArray[np.bool_], names: NDArray[np.object_], good: NDArray[np.bool_]) -> list[str]:
+def _off(far: Mask, names: NDArray[np.object_], good: Mask) -> list[str]:
     """Those whose points are for the most part far, where so many of them are hardly together by chance.
 
     Far ones are everywhere: wrong clicks, and detections of what is no known point.
@@ -794,7 +786,7 @@ def _off(far: NDArray[np.bool_], names: NDArray[np.object_], good: NDArray[np.bo
     # As if there had been half a far one more, so that none seen is not none ever.
     share = (far[others].sum() + 0.5) / (others.sum() + 1)
 
-    def by_chance(of: NDArray[np.bool_]) -> float:
+    def by_chance(of: Mask) -> float:
         return len(rows) * float(bdtrc(far[of].sum() - 1, of.sum(), share))
 
     return [name for name in off if by_chance(rows[name]) < BY_CHANCE]

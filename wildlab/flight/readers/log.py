@@ -19,12 +19,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from wildlab.flight.clock_fitting import GPS_START_S
 from wildlab.flight.clocks import between
-from wildlab.flight.readers.text import LATEST_S, decode, plural
+from wildlab.flight.readers.text import LATEST_S, decode
 from wildlab.flight.schema import BOUNDS, FIELD, FORCE, QUATERNION, RATE, VELOCITY
-from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from wildlab.geometry.frames import Array, Indices, Mask, matrix_to_euler, quaternion_to_matrix
 
 #: Columns that every part over time has: s since 1970 in UTC (NaN: not known), and the log's own stamp, s.
 TIMES = ("time_s", "time_log_s")
@@ -198,16 +195,11 @@ def make_stream(
     ValueError
         Where a column is not one of the part's, or has another length: a mistake of a reader.
     """
-    known = {*PARTS[part], *TIMES}
-    made: dict[str, NDArray[Any]] = {}
-    for name, values in columns.items():
-        if name not in known:
-            raise ValueError(f"{name!r} is no column of {part!r}")
-        made[name] = np.asarray(values, dtype=object if name in TEXTS else np.float64)
-    lengths = {len(one) for one in made.values()}
-    if len(lengths) != 1:
-        raise ValueError(f"columns of {part!r} have the lengths {sorted(lengths)}")
-    count = lengths.pop()
+    made = {
+        name: np.asarray(values, dtype=object if name in TEXTS else np.float64)
+        for name, values in columns.items()
+    }
+    (count,) = {len(one) for one in made.values()}
     why = np.full(count, "", dtype=object)
     for reason, holds in (unusable or {}).items():
         why[np.asarray(holds, bool) & (why == "")] = reason
@@ -238,15 +230,13 @@ ONE_HEIGHT = "heights above ellipsoid and sea level are the same: they are taken
 _EARTH_M = 6371e3
 
 
-def judge_log(found: RawLog, track: bool) -> RawLog:
+def judge_log(found: RawLog) -> RawLog:
     """A log out of what its reader decoded.
 
     Parameters
     ----------
     found
         What `decode` gave.
-    track
-        Whether it is the track of a receiver: heights that few rows have are left out.
 
     Returns
     -------
@@ -257,7 +247,6 @@ def judge_log(found: RawLog, track: bool) -> RawLog:
     notes = list(found.notes)
     for name, one in parts.items():
         columns = one.columns if name in STILL else _filled(name, one)
-        notes += drop_rare_heights(columns) if track else []
         parts[name] = replace(one, columns=columns)
     if "gnss" in parts and _one_height(parts["gnss"].columns):
         notes.append(ONE_HEIGHT)
@@ -299,21 +288,6 @@ def _one_height(columns: Mapping[str, ArrayLike]) -> bool:
     return bool(known.any() and (apart[known] == 0).all())
 
 
-def drop_rare_heights(columns: dict[str, Array]) -> list[str]:
-    """Takes heights out of `columns` that fewer than half of the rows have; a sentence where it did.
-
-    Rows without a height would be of no use beside rows with one, and most would be lost.
-    """
-    names = [name for name in HEIGHTS if name in columns]
-    heights = [columns[name] for name in names if name != "undulation_m"]
-    known = np.isfinite(np.array(heights, float)).any(axis=0) if heights else np.zeros(0, bool)
-    if not known.any() or known.mean() >= 0.5:
-        return []
-    for name in names:
-        del columns[name]
-    return [f"only {plural(int(known.sum()), 'row')} of {len(known)} have a height: heights are left out"]
-
-
 def placed(latitude_deg: ArrayLike, longitude_deg: ArrayLike) -> Mask:
     """(N,) whether latitudes and longitudes (N,) are numbers, on Earth, and not both zero."""
     latitude, longitude = np.asarray(latitude_deg, float), np.asarray(longitude_deg, float)
@@ -346,7 +320,9 @@ def judge(part: str, decoded: Stream) -> dict[str, Mask]:
         Reason -> (N,) bool for `make_stream`.
     """
     have = {name: np.asarray(values, float) for name, values in decoded.columns.items() if name not in TEXTS}
-    time = _stamps(have)
+    stamps = [have[name] for name in TIMES if name in have]
+    # In UTC, or by the log's own clock where no row has UTC.
+    time = next((one for one in stamps if np.isfinite(one).any()), stamps[-1])
     utc = have.get("time_s", np.full(len(time), np.nan))
     found = dict(decoded.unusable)
 
@@ -388,17 +364,11 @@ def judge(part: str, decoded: Stream) -> dict[str, Mask]:
         heights = starting("height_")
         if where and heights:
             without = ~any_of([~np.isnan(one) for one in heights], len(time))
-            if not without[~bad].all():
+            if 2 * without[~bad].sum() <= (~bad).sum():
                 add("no height", without & ~bad)
                 bad = bad | without
     _judge_order(time, have if where else {}, bad, found)
     return found
-
-
-def _stamps(columns: Mapping[str, ArrayLike]) -> Array:
-    """Times in UTC, or by the log's own clock where no row has UTC."""
-    stamps = [np.asarray(columns[name], float) for name in TIMES if name in columns]
-    return next((one for one in stamps if np.isfinite(one).any()), stamps[-1])
 
 
 def _judge_order(time: Array, have: Mapping[str, Array], bad: Mask, found: dict[str, Mask]) -> None:
@@ -406,7 +376,7 @@ def _judge_order(time: Array, have: Mapping[str, Array], bad: Mask, found: dict[
     if not len(good):
         return
 
-    def mark(reason: str, rows: NDArray[np.intp]) -> None:
+    def mark(reason: str, rows: Indices) -> None:
         found[reason] = np.zeros(len(time), bool)
         found[reason][rows] = True
 
@@ -494,22 +464,17 @@ def _reachable(time: Array, latitude: Array, longitude: Array, height: Array) ->
         return np.asarray(away <= NOISE_M + BOUNDS["speed"][1] * np.abs(time[j] - time[i]))
 
     every = np.arange(len(time))
-    starts = np.r_[0, np.flatnonzero(~reached(every[:-1], every[1:])) + 1]
-    ends = np.r_[starts[1:], len(time)]
-    longest = int(np.argmax(ends - starts))
+    runs = np.split(every, 1 + np.flatnonzero(~reached(every[:-1], every[1:])))
+    longest = int(np.argmax([len(run) for run in runs]))
     kept = np.zeros(len(time), bool)
-    kept[starts[longest] : ends[longest]] = True
-    last, first = ends[longest] - 1, starts[longest]
-    for begin, end in zip(starts[longest + 1 :], ends[longest + 1 :], strict=True):
-        near = begin + np.flatnonzero(reached(last, every[begin:end]))
-        if len(near):
-            kept[near[0] : end] = True
-            last = end - 1
-    for begin, end in zip(starts[:longest][::-1], ends[:longest][::-1], strict=True):
-        near = begin + np.flatnonzero(reached(first, every[begin:end]))
-        if len(near):
-            kept[begin : near[-1] + 1] = True
-            first = begin
+    kept[runs[longest]] = True
+    before = [run[::-1] for run in runs[:longest][::-1]]
+    for last, others in ((runs[longest][-1], runs[longest + 1 :]), (runs[longest][0], before)):
+        for run in others:
+            near = np.flatnonzero(reached(last, run))
+            if len(near):
+                kept[run[near[0] :]] = True
+                last = run[-1]
     return kept
 
 
@@ -557,7 +522,7 @@ class Messages:
 
     name: str
     fields: Mapping[str, Any]
-    rows: NDArray[np.int64]
+    rows: Indices
 
     def __len__(self) -> int:
         return len(self.rows)

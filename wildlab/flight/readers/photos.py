@@ -30,6 +30,7 @@ from scipy.spatial.transform import Rotation
 from wildlab.errors import WildlabError
 from wildlab.flight.clock_fitting import wall_to_utc
 from wildlab.flight.files import regular_size, unreadable
+from wildlab.flight.manifest import CameraPart
 from wildlab.flight.readers.frames.image import (
     CAMERA,
     MOST_BYTES,
@@ -44,17 +45,9 @@ from wildlab.flight.readers.frames.image import (
     record_order,
     segments_of,
 )
-from wildlab.flight.readers.log import (
-    ANGLES,
-    WORLD,
-    Array,
-    RawLog,
-    Stream,
-    any_of,
-    holding,
-    named,
-)
+from wildlab.flight.readers.log import ANGLES, WORLD, RawLog, Stream, any_of, holding, named
 from wildlab.flight.readers.text import LATEST_S, plural, stamp_s, told
+from wildlab.geometry.frames import Array
 
 #: Bytes of XMP that are looked through.
 MOST_XMP = 1_000_000
@@ -180,8 +173,6 @@ EARLIEST_S = 631_151_999.0
 DIAGONAL_35MM = math.hypot(36.0, 24.0)
 #: Kinds of fix as MAVLink numbers them, by DJI's RtkFlag.
 RTK_FIXES = {16: 3.0, 32: 5.0, 34: 5.0, 50: 6.0}
-#: Two statements of one focal length that differ by more contradict each other.
-CONTRADICTS = 0.1
 #: Where focal lengths in px come from, best first.
 CALIBRATED, BY_SENSOR, BY_SIZE, BY_VIEW, BY_FILM = (
     "calibrated by the maker",
@@ -406,8 +397,8 @@ def _offset(said: str) -> float:
 # -- focal lengths
 
 
-def focal_px_of(tags: Tags, width: int, height: int) -> list[tuple[str, float]]:
-    """Every statement of a focal length in px, with what it comes from, best first.
+def focal_px_of(tags: Tags, width: int, height: int) -> tuple[str, float]:
+    """The best statement of a focal length in px, behind what it comes from; "" and NaN where there is none.
 
     Parameters
     ----------
@@ -423,7 +414,7 @@ def focal_px_of(tags: Tags, width: int, height: int) -> list[tuple[str, float]]:
     """
     found: list[tuple[str, float]] = []
     if not width or not height:
-        return found
+        return "", NAN
     scale = max(width, height) / max(tags.width or width, tags.height or height)
     own = dewarped_of(tags)
     if not math.isfinite(own):
@@ -432,21 +423,18 @@ def focal_px_of(tags: Tags, width: int, height: int) -> list[tuple[str, float]]:
         found.append((CALIBRATED, own * scale))
     mm = _mm(tags)
     per_mm = [_per_mm(tags, axis) for axis in "XY"]
-    if mm > 0 and all(map(math.isfinite, per_mm)):
-        square = abs(per_mm[0] / per_mm[1] - 1) < 0.01
-        # Some cameras write the size of their sensor where its resolution belongs: then pixels are square by
-        # that reading, and by the standard's they are as oblong as the image.
-        pitches = per_mm[0] / width, per_mm[1] / height
-        if square:
-            found.append((BY_SENSOR, mm * per_mm[0] * scale))
-        elif abs(pitches[0] / pitches[1] - 1) < 0.01:
-            found.append((BY_SIZE, mm / pitches[0]))
+    if mm > 0 and abs(per_mm[0] / per_mm[1] - 1) < 0.01:
+        found.append((BY_SENSOR, mm * per_mm[0] * scale))
+    # Some cameras write the size of their sensor where its resolution belongs: then pixels are square by that
+    # reading, and by the standard's they are as oblong as the image.
+    elif mm > 0 and abs(per_mm[0] / width * height / per_mm[1] - 1) < 0.01:
+        found.append((BY_SIZE, mm * width / per_mm[0]))
     if 0 < tags.view_deg < 179:
         found.append((BY_VIEW, width / 2 / math.tan(math.radians(tags.view_deg) / 2)))
     film = number(tags.exif.get("FocalLengthIn35mmFilm"))
     if 0 < film < 1e5:
         found.append((BY_FILM, film * math.hypot(width, height) / DIAGONAL_35MM))
-    return [(what, px) for what, px in found if 1 < px < 1e7]
+    return next(((what, px) for what, px in found if 1 < px < 1e7), ("", NAN))
 
 
 def dewarped_of(tags: Tags) -> float:
@@ -555,8 +543,7 @@ def folder_decode(folder: Path, zone: str | None) -> RawLog:
         for path, place in zip(paths, above, strict=True)
     ]
     cameras = _cameras(files, tags, sizes)
-    stated = [focal_px_of(one, *size) for one, size in zip(tags, sizes, strict=True)]
-    focal = [one[0] if one else ("", NAN) for one in stated]
+    focal = [focal_px_of(one, *size) for one, size in zip(tags, sizes, strict=True)]
     columns: dict[str, Any] = {"file": files, "latitude_deg": latitude, "longitude_deg": longitude}
     for names, of in _COLUMNS.items():
         table = named(names, np.array([of(one) for one in tags], float).T)
@@ -591,7 +578,7 @@ def folder_decode(folder: Path, zone: str | None) -> RawLog:
         vehicle=makers.pop() if len(makers) == 1 else "",
         clock=max(clocks, key=clocks.__getitem__, default=""),
         lost=told(*lost, *((count, "image", f": {what}") for what, count in problems.items())),
-        notes=[*notes, *_notes(tags, cameras, stated, why)],
+        notes=[*notes, *_notes(tags, cameras, why)],
     )
 
 
@@ -659,17 +646,9 @@ def _times(tags: list[Tags], zone: str | None) -> tuple[Array, Array, str, list[
     return wall, time, clock, holding(notes)
 
 
-def _notes(
-    tags: list[Tags], cameras: list[str], stated: list[list[tuple[str, float]]], why: list[str]
-) -> list[str]:
-    """What a user should know of a folder: cameras, sizes, tags that contradict each other, heights."""
+def _notes(tags: list[Tags], cameras: list[str], why: list[str]) -> list[str]:
+    """What a user should know of a folder: cameras, sizes, heights."""
     notes: Counter[str] = Counter(one for one in why if one)
-    for focal in filter(None, stated):
-        by, used = focal[0]
-        for what, px in focal[1:]:
-            if abs(px / used - 1) > CONTRADICTS:
-                both = f"{used:.0f} px ({by}, used), {px:.0f} px ({what})"
-                notes[f"tags contradict each other on the focal length: {both}"] += 1
     rtk = [rtk_of(one) for one in tags]
     fixed = [one in RTK_FIXES for one in rtk]
     notes["heights with RTK count from the ellipsoid"] = sum(fixed)
@@ -723,41 +702,51 @@ def of_camera(log: RawLog, camera: str) -> RawLog:
     return replace(log, parts={**log.parts, "photos": stream.take(stream.columns["camera"] == camera)})
 
 
-def camera_of(log: RawLog) -> dict[str, Any] | None:
-    """Name, size and focal length (px, and ``how``: what it is from) of the one camera of a folder.
+def camera_of(
+    log: RawLog, stated: CameraPart | None = None, focal_px: float | None = None
+) -> tuple[CameraPart | None, str]:
+    """The one camera of a folder and how it is known, in a clause; or None and why it is not.
 
-    None where no tag says a focal length in px, or a size.
-
-    Raises
-    ------
-    WildlabError
-        Where images are of several cameras, sizes or focal lengths.
+    What the user states, the camera or its focal length alone, counts for more than the tags.
     """
     columns = log.parts["photos"].columns
-    known = np.isfinite(columns["width_px"]) & np.isfinite(columns["height_px"])
-    if not known.any():
-        return None
-
-    def one(name: str, what: str) -> Any:
-        found = sorted(set(columns[name][known].tolist()))
-        if len(found) > 1:
-            said = ", ".join(str(each) or "one without a name" for each in found[:5])
-            problem = f"the images are of {len(found)} {what}: {said}"
-            raise WildlabError(problem, "give each a folder of its own", field="camera")
-        return found[0]
-
-    camera, width, height = one("camera", "cameras"), one("width_px", "widths"), one("height_px", "heights")
-    focal = columns["focal_px"][known]
-    if not np.isfinite(focal).any():
-        return None
-    middle = float(np.nanmedian(focal))
-    if np.nanmax(np.abs(focal / middle - 1)) > 0.02:
-        least, most = np.nanmin(focal), np.nanmax(focal)
-        problem = f"the focal length changes from {least:.0f} to {most:.0f} px: the lens zooms"
-        raise WildlabError(problem, "give each focal length a folder of its own", field="focal_px")
-    how = Counter(str(each) for each in columns["focal_from"][known] if each).most_common(1)[0][0]
-    if how == BY_FILM:
-        film = middle * DIAGONAL_35MM / math.hypot(width, height)
-        how += f" of {film:g} mm over the diagonal, rounded to within {50 / film:.0f} %"
-    sizes = {"width_px": int(width), "height_px": int(height)}
-    return {"camera": camera, **sizes, "focal_px": middle, "how": how}
+    every = np.column_stack([columns["width_px"], columns["height_px"]])
+    known = np.isfinite(every).all(axis=1)
+    sizes = np.unique(every[known], axis=0)
+    if stated is not None:
+        own = (stated.width_px, stated.height_px)
+        if len(sizes) and (sizes != own).any():
+            seen = ", ".join("{:.0f} x {:.0f}".format(*one) for one in sizes[:4])
+            return None, f"the stated camera has {own[0]} x {own[1]} px, and they have {seen}"
+        return stated, "as you stated it"
+    names = sorted({str(one) for one in columns.get("camera", np.full(len(known), ""))[known]})
+    if len(names) > 1 and focal_px is None:
+        said = ", ".join(one or "one without a name" for one in names[:5])
+        return None, f"they are of {len(names)} cameras: {said}"
+    if len(sizes) != 1:
+        return None, "they are of several sizes" if len(sizes) else "nothing says how large they are"
+    width, height = map(int, sizes[0])
+    how = "as you stated it"
+    if focal_px is None:
+        focal = columns["focal_px"][known]
+        if not np.isfinite(focal).any():
+            return None, "no tag has the focal length in pixels"
+        focal_px = float(np.nanmedian(focal))
+        if np.nanmax(np.abs(focal / focal_px - 1)) > 0.02:
+            least, most = np.nanmin(focal), np.nanmax(focal)
+            return None, f"the focal length changes from {least:.0f} to {most:.0f} px: the lens zooms"
+        how = Counter(str(each) for each in columns["focal_from"][known] if each).most_common(1)[0][0]
+        if how == BY_FILM:
+            film = focal_px * DIAGONAL_35MM / math.hypot(width, height)
+            how += f" of {film:g} mm over the diagonal, rounded to within {50 / film:.0f} %"
+    camera = CameraPart(
+        name=(names[0] if len(names) == 1 else "") or "not stated",
+        width_px=width,
+        height_px=height,
+        fx_px=focal_px,
+        fy_px=focal_px,
+        cx_px=(width - 1) / 2,
+        cy_px=(height - 1) / 2,
+    )
+    how = f"{width} x {height} px, focal length {focal_px:.0f} px ({how})"
+    return camera, f"{how}; a central principal point, no distortion"

@@ -17,8 +17,9 @@ from typing import Any, NamedTuple
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
-Mask = NDArray[np.bool_]
+from wildlab.geometry.frames import Mask
 
 #: Grey levels by which JPEG makes an empty border uneven.
 JPEG_UNEVEN = 4
@@ -134,18 +135,13 @@ def find_overlay(images: Sequence[NDArray[Any]]) -> Mask | None:
     if span <= 0 or float(np.nanmedian(change)) < MOVED * span:
         return None
     middle = np.median(stack, axis=0)
-    apart = np.abs(middle - cv2.medianBlur(_as_bytes(middle), 31).astype(np.float32) * span / 255 - low.min())
+    apart = np.abs(middle - cv2.medianBlur(middle.astype(np.uint8), 31))
     still = (change <= STILL * span) & (apart > 0.2 * span)
     # Strokes lie beside strokes: single pixels that noise happens to leave alone are none.
     still &= cv2.blur(still.astype(np.float32), (7, 7)) >= DENSE - 1e-6
     # Letters are thin and lie close together: what is between them belongs to them.
     marks = cv2.morphologyEx(still.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((7, 7), np.uint8)) > 0
     return _wider(marks) if 0 < marks.mean() < MOST_TEXT else np.zeros(marks.shape, bool)
-
-
-def _as_bytes(image: NDArray[np.float32]) -> NDArray[np.uint8]:
-    low, high = float(image.min()), float(image.max())
-    return np.asarray((image - low) * (255 / max(high - low, 1e-9)), np.uint8)
 
 
 def _wider(mask: Mask) -> Mask:
@@ -194,8 +190,6 @@ def problem_of(image: NDArray[Any], valid: Mask) -> str:
 #: pixels. Closed shutters give 0.8 to 1.3 (also after gain control and JPEG); the 1310 real frames at hand
 #: 106 and more; an even sea under the vignetting of a lens 180 and more.
 BLOCK, MOST_RATIO, FEWEST_BLOCKS = 16, 2.0, 16
-#: The same in a sample of every fourth row and column, where those real frames still give 5 and more.
-SAMPLED, SAMPLED_RATIO = 4, 3.0
 #: px: side of the squares whose mean may lie off by so many standard deviations of independent pixels, and to
 #: how many a single pixel counts. A dead pixel moves such a mean by one, a warm body of 3 px by nine.
 SMALL, STANDS_OUT, CLIPPED_AT = 5, 7.0, 5.0
@@ -204,7 +198,7 @@ SMALL, STANDS_OUT, CLIPPED_AT = 5, 7.0, 5.0
 HELD, MOST_ALIKE = 3, 0.25
 
 
-def is_shutter(image: NDArray[Any], valid: NDArray[np.bool_]) -> bool:
+def is_shutter(image: NDArray[Any], valid: Mask) -> bool:
     """Whether an image has noise and nothing else, as that of a closed shutter.
 
     Parameters
@@ -227,19 +221,11 @@ def is_shutter(image: NDArray[Any], valid: NDArray[np.bool_]) -> bool:
     [True, False]
     """
     grey = image if image.ndim == 2 else image[..., 1]
-    # A sample rules out nearly all images, at a tenth of the time.
-    few = (slice(None, None, SAMPLED), slice(None, None, SAMPLED))
-    if not _is_even(grey[few], valid[few], BLOCK // SAMPLED, SAMPLED_RATIO):
-        return False
-    return _is_even(grey, valid, BLOCK, MOST_RATIO)
-
-
-def _is_even(image: NDArray[Any], valid: NDArray[np.bool_], side: int, most_ratio: float) -> bool:
-    rows, columns = (length // side for length in image.shape)
+    rows, columns = (length // BLOCK for length in grey.shape)
     if rows * columns < FEWEST_BLOCKS:
         return False
-    cut = (slice(rows * side), slice(columns * side))
-    grey, valid = image[cut].astype(np.float32), valid[cut]
+    cut = (slice(rows * BLOCK), slice(columns * BLOCK))
+    grey, valid = grey[cut].astype(np.float32), valid[cut]
     whole = cv2.resize(valid.astype(np.float32), (columns, rows), interpolation=cv2.INTER_AREA) == 1
     if whole.sum() < FEWEST_BLOCKS:
         return False
@@ -249,7 +235,7 @@ def _is_even(image: NDArray[Any], valid: NDArray[np.bool_], side: int, most_rati
     means = cv2.resize(grey, (columns, rows), interpolation=cv2.INTER_AREA)[whole]
     squares = cv2.resize(grey * grey, (columns, rows), interpolation=cv2.INTER_AREA)[whole]
     inside = float(np.mean(squares - means**2))
-    if inside <= 0 or means.var() >= most_ratio * inside / side**2:
+    if inside <= 0 or means.var() >= MOST_RATIO * inside / BLOCK**2:
         return False
     return bool(np.abs(cv2.blur(grey, (SMALL, SMALL))).max() < STANDS_OUT * np.sqrt(inside) / SMALL)
 
@@ -440,17 +426,13 @@ def measure_vignetting(images: Sequence[NDArray[Any]], valid: Mask) -> Vignettin
     half = np.array([(rows - 1) / 2, (columns - 1) / 2])
     square = ((v - half[0]) ** 2 + (u - half[1]) ** 2) / max(float((half**2).sum()), 1.0)
     # Rings of one area: of r^2 evenly.
-    ring = np.minimum((square * RINGS).astype(int), RINGS - 1)
-    inside = [np.flatnonzero(valid & (ring == number)) for number in range(RINGS)]
-    enough = [number for number, pixels in enumerate(inside) if len(pixels) >= 16]
+    ring = np.where(valid, np.minimum((square * RINGS).astype(int), RINGS - 1), RINGS)
+    pixels = np.bincount(ring.ravel(), minlength=RINGS)[:RINGS]
+    enough = np.flatnonzero(pixels >= 16)
     if len(enough) < RINGS // 2:
         return None
-    at = np.array([square.ravel()[inside[number]].mean() for number in enough])
-    weight = np.sqrt([len(inside[number]) for number in enough])
-    falls = []
-    for image in images:
-        flat = image.ravel().astype(float)
-        falls.append([np.nanmedian(flat[inside[number]]) for number in enough])
+    at, weight = ndimage.mean(square, ring, enough), np.sqrt(pixels[enough])
+    falls = [ndimage.median(image, ring, enough) for image in images]
     design = np.stack([np.ones(len(at)), at, at**2], axis=1) * weight[:, None]
     fits, *_ = np.linalg.lstsq(design, (np.array(falls) * weight).T, rcond=None)
     corners = fits[1] + fits[2]
