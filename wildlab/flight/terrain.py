@@ -497,16 +497,25 @@ def _refuse_elsewhere(
 ) -> None:
     """Refuse a map that no position of the flight lies over, and say how far off it is."""
     corner = np.array(places.map.shape[::-1], float)
-    found = places.of_points(positions)[:, :2]
-    if ((found >= 0) & (found <= corner)).all(axis=1).any():
+
+    def over(points: Array) -> bool:
+        cells = places.of_points(points)[:, :2]
+        return bool(((cells >= 0) & (cells <= corner)).all(axis=1).any())
+
+    if over(positions):
         return
+    found = places.of_points(positions)[:, :2]
     middle = len(found) // 2
     nearest = np.clip(np.nan_to_num(found[middle], nan=0.0), 0.0, corner)
     away = places.of_cells(nearest[None], np.zeros(1))[0, :2] - positions[middle, :2]
-    far = f"{np.hypot(*away) / 1000:,.1f} km away"
+    far, fix = f"{np.hypot(*away) / 1000:,.1f} km away", f"give another map, or check CRS and {also}"
+    longitude, latitude, height = ned_to_geodetic(positions, places.origin).T
+    latitude = np.where(np.abs(latitude) <= np.pi / 2, latitude, np.nan)
+    if over(geodetic_to_ned(latitude, longitude, height, places.origin)):
+        far, fix = f"{far}, but with latitude and longitude exchanged", f"exchange them in {also}"
     raise WildlabError(
         f"{what} over this map, whose nearest cell is {far}",
-        f"give another map, or check CRS and {also}",
+        fix,
         file=places.map.path,
         field="terrain",
     )
