@@ -10,7 +10,7 @@ Using a UAV and Thermal Imagery, master's thesis, Linköping University 2016.
 
 - `run_filter`: Kalman, extended or Schmidt filter over a whole flight; `run_batch`: many runs at once.
 - `run_coloured`, `run_unscented`, `run_imm`: differenced measurements, sigma points, several motion models.
-- `run_smoothed`, `smooth`: back over a track, for flights that are over.
+- `smooth`: back over a track, for flights that are over.
 - `consider_all`: errors of poses, clocks and sensors that a filter keeps in mind.
 - `motion`, `sensors`: what the filters are given of target and sensor. `merge`: several sensors into one
   track.
@@ -34,7 +34,7 @@ from wildlab.tracking.motion import (
 )
 from wildlab.tracking.run import Start, Track, run_filter, start_from_first, start_from_position
 from wildlab.tracking.sensors import Merged, Sensor, SensorMeasurements, merge, pixels, positions, renamed
-from wildlab.tracking.smoothing import run_smoothed, smooth
+from wildlab.tracking.smoothing import smooth
 
 __all__ = [
     "BatchCamera",
@@ -58,7 +58,6 @@ __all__ = [
     "run_coloured",
     "run_filter",
     "run_imm",
-    "run_smoothed",
     "run_unscented",
     "singer",
     "smooth",

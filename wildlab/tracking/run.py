@@ -142,6 +142,8 @@ class Track(NamedTuple):
         (N,) index of the detection that was nearest, -1 where there was none to choose from.
     limited
         (N,) bool: the Schmidt filter's cross-covariance had to be shortened here (`kalman.limit_cross`).
+    C
+        (N, n, k) after each row, with the k errors that `run_filter` considered.
     """
 
     times: Array
@@ -153,6 +155,7 @@ class Track(NamedTuple):
     used: NDArray[np.bool_]
     chosen: NDArray[np.int64]
     limited: NDArray[np.bool_]
+    C: Array = np.empty((0, 0, 0))
 
 
 class FilterInputs(NamedTuple):
@@ -368,25 +371,6 @@ def _check_order(times: Array, field: str) -> None:
 Ends = Callable[[int, int, Array, Array], bool]
 
 
-class Step(NamedTuple):
-    """What a filter did at one row; ``gain`` and what belongs to it are None where nothing was used."""
-
-    row: int
-    time: float
-    F: Array  # (n, n) from the row before, or from the start
-    Q: Array
-    x_prior: Array  # (n,)
-    P_prior: Array
-    C_prior: Array  # (n, k)
-    x: Array
-    P: Array
-    C: Array
-    gain: Array | None = None  # (n, m)
-    H: Array | None = None  # (m, n)
-    H_errors: Array | None = None  # (m, k)
-    R: Array | None = None  # (m, m)
-
-
 def run_filter(
     times: ArrayLike,
     measurements: ArrayLike,
@@ -399,7 +383,6 @@ def run_filter(
     gate_probability: float = 1.0,
     output_times: ArrayLike | None = None,
     ends: Ends | None = None,
-    steps: list[Step] | None = None,
 ) -> Track:
     """Kalman filter on positions; extended filter on pixels, bearings, ranges; Schmidt filter with ``pose``.
 
@@ -432,8 +415,6 @@ def run_filter(
     ends
         When the track ends: asked at every row behind the start, see `Ends`. From there on there are no
         estimates. None: never.
-    steps
-        Is filled with what was done at every row, for a smoother.
 
     Returns
     -------
@@ -463,18 +444,14 @@ def run_filter(
     given = checked(times, measurements, R, gate_probability, output_times, sensor.sizes)
     check_sensor(sensor, start, len(given.times))
     errors = errors_of(pose, sensor, len(given.times))
-    n, steps = len(start.x), [] if steps is None else steps
+    n, x_last = len(start.x), np.asarray(start.x, float)
     C = np.zeros((n, 0 if errors is None else len(errors.times)))
-
-    x_last, P_first = np.asarray(start.x, float), np.asarray(start.P, float)
+    crosses = np.zeros((len(given.times), *C.shape))
     # The row that a start was made from, or the first that is not before it.
     last = (
         start.row
         if start.row >= 0
         else min(int(np.searchsorted(given.times, start.time)), len(given.times) - 1)
-    )
-    steps.append(
-        Step(last, float(start.time), np.eye(n), np.zeros((n, n)), x_last, P_first, C, x_last, P_first, C)
     )
 
     def step(row: int, state: State, track: Track) -> State | None:
@@ -485,16 +462,14 @@ def run_filter(
         x, P = predict(x, P, F, Q)
         if ends is not None and ends(row, last, x_last, P):
             return None
-        C = C if errors is None else errors.carry(C, F, row, dt)
-        done = Step(row, now, F, Q, x, P, C, x, P, C)
-        steps.append(done)
+        if errors is not None:
+            C = crosses[row] = errors.carry(C, F, row, dt)
         if not np.isfinite(given.z[row]).all(axis=-1).any():
             return now, x, P
         expected = sensor.predict(row, x[: sensor.states])
         H = on_state(expected.H_position, n)
         if not (np.isfinite(expected.z).all() and np.isfinite(H).all()):
             return now, x, P
-        H_errors = np.zeros((len(H), 0))
         if errors is None:
             spread = H @ P @ H.T
         else:
@@ -502,7 +477,6 @@ def run_filter(
             if not (np.isfinite(P_pose).all() and np.isfinite(H_errors).all()):
                 return now, x, P
             C, track.limited[row] = limit_cross(C.copy(), P.copy(), P_pose.copy())
-            steps[-1] = done = done._replace(C_prior=C, C=C)
             spread = spread_of_prediction(P, C, P_pose, H, H_errors)
         with np.errstate(invalid="ignore"):
             angles = angles_at(sensor, row)
@@ -515,13 +489,11 @@ def run_filter(
             return now, x, P
         noise = given.R[row, best.detection]
         if errors is None:
-            update = correct(x, P, best.innovation, H, noise)
-            x, P, gain = update.x, update.P, update.gain
+            done = correct(x, P, best.innovation, H, noise)
         else:
-            considered = update_schmidt(x, P, C, P_pose, best.innovation, H, H_errors, noise)
-            x, P, C, gain = considered.x, considered.P, considered.C, considered.gain
-        last, x_last = row, x
-        steps[-1] = done._replace(x=x, P=P, C=C, gain=gain, H=H, H_errors=H_errors, R=noise)
-        return now, x, P
+            done = update_schmidt(x, P, C, P_pose, best.innovation, H, H_errors, noise)
+            C = crosses[row] = done.C
+        last, x_last = row, done.x
+        return now, done.x, done.P
 
-    return step_through(given, start, motion, step)
+    return step_through(given, start, motion, step)._replace(C=crosses)
