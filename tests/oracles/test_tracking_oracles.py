@@ -13,8 +13,7 @@ from wildlab.tracking import sensors as m
 from wildlab.tracking.batch import run_batch
 from wildlab.tracking.filters import run_unscented
 from wildlab.tracking.motion import constant_velocity, singer
-from wildlab.tracking.run import Start, run_filter
-from wildlab.tracking.smoothing import smooth
+from wildlab.tracking.run import Start, run_filter, smooth
 
 CV = partial(constant_velocity, sd_acceleration=0.2)
 

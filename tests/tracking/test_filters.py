@@ -17,9 +17,8 @@ from wildlab.tracking import sensors as m
 from wildlab.tracking.filters import run_coloured, run_imm, run_unscented, thin
 from wildlab.tracking.kalman import Considered, errors_of
 from wildlab.tracking.motion import constant_velocity, rest, singer, white_acceleration
-from wildlab.tracking.run import Start, run_filter, start_from_first
+from wildlab.tracking.run import Start, run_filter, smooth, start_from_first
 from wildlab.tracking.sensors import predict_range_bearing
-from wildlab.tracking.smoothing import smooth
 
 ROUGH = partial(constant_velocity, sd_acceleration=0.3)
 SINGER = partial(singer, alpha=0.1, variance=0.2)

@@ -15,7 +15,7 @@ from wildlab.errors import WildlabError
 from wildlab.flight.schema import COVARIANCE_COLUMNS, POSITION, QUATERNION
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import quaternion_to_matrix
-from wildlab.geometry.turns import between_attitudes
+from wildlab.geometry.kernels import between_attitudes
 
 Array = NDArray[np.float64]
 

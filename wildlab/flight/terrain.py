@@ -24,7 +24,7 @@ from wildlab.flight.readers.terrain import ElevationMap, Heights, open_elevation
 from wildlab.flight.schema import POSITION
 from wildlab.flight.store import MOST_NODES, Flight
 from wildlab.geometry.frames import Origin, geodetic_to_ned, ned_to_geodetic
-from wildlab.geometry.terrain import Terrain
+from wildlab.geometry.georeference import Terrain
 
 Array = NDArray[np.float64]
 

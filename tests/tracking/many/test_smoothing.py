@@ -13,12 +13,11 @@ from tests.tracking.many.test_run import look
 from tests.tracking.many.test_update import OPEN, SURE
 from tests.tracking.poses import GENERATORS
 from wildlab.evaluation.consistency import chi_square_interval, nees
-from wildlab.tracking.many.run import Shown, run_many, smooth_many
-from wildlab.tracking.many.target_model import Hull, own_columns, own_lasting
 from wildlab.tracking.motion import white_acceleration
-from wildlab.tracking.run import Start, Track, run_filter
+from wildlab.tracking.multitarget import Shown, run_many, smooth_many
+from wildlab.tracking.run import Start, Track, lasting_errors, run_filter, smooth, smooth_moments
 from wildlab.tracking.sensors import positions
-from wildlab.tracking.smoothing import lasting_errors, smooth, smooth_moments
+from wildlab.tracking.target_model import Hull, own_columns, own_lasting
 
 H = np.eye(2, 4)
 

@@ -56,7 +56,7 @@ from wildlab.tracking.filters import run_coloured, run_imm, run_unscented, thin
 from wildlab.tracking.kalman import Considered, consider_all
 from wildlab.tracking.kalman import errors_of as filter_errors
 from wildlab.tracking.motion import Motion
-from wildlab.tracking.run import Ends, Start, Track, run_filter, start_from_position
+from wildlab.tracking.run import Ends, Start, Track, known_before, run_filter, smooth, start_from_position
 from wildlab.tracking.sensors import (
     Merged,
     Prediction,
@@ -67,7 +67,6 @@ from wildlab.tracking.sensors import (
     second_derivatives,
     share_left_out,
 )
-from wildlab.tracking.smoothing import known_before, smooth
 
 # -- where a track starts and where it ends
 

@@ -29,8 +29,7 @@ from wildlab.flight.manifest import CameraPart
 from wildlab.flight.schema import DETECTION_KINDS, POSITION
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.georeference import BELOW, georeference_pixels
-from wildlab.geometry.terrain import Terrain, pixels_to_terrain
+from wildlab.geometry.georeference import BELOW, Terrain, georeference_pixels, pixels_to_terrain
 
 #: No lens magnifies one way 2 % more than the other: then the calibration is of something else.
 FOCAL_RATIO = 0.02

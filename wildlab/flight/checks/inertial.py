@@ -33,8 +33,7 @@ from wildlab.flight.checks.findings import (
 from wildlab.flight.clocks import gnss_times
 from wildlab.flight.schema import FORCE, POSITION, QUATERNION, RATE, SECOND_COLUMNS, VELOCITY
 from wildlab.flight.store import Flight
-from wildlab.geometry.frames import Array
-from wildlab.geometry.gravity import USUAL_GRAVITY
+from wildlab.geometry.frames import USUAL_GRAVITY, Array
 
 AXES = "xyz"
 

@@ -43,7 +43,7 @@ from wildlab.flight.readers.log import (
 )
 from wildlab.flight.readers.text import told
 from wildlab.flight.schema import FIELD, FORCE, RATE, VELOCITY
-from wildlab.geometry.gravity import STANDARD_GRAVITY
+from wildlab.geometry.frames import STANDARD_GRAVITY
 
 #: MAV_AUTOPILOT_INVALID and MAV_TYPE_GCS: what is no autopilot says so in its heartbeat.
 _NO_AUTOPILOT, _GROUND_STATION = 8, 6

@@ -46,7 +46,7 @@ from wildlab.flight.readers.log import (
 )
 from wildlab.flight.readers.text import number, numbers, parse_xml, plural, stamp_s, told
 from wildlab.flight.schema import VELOCITY
-from wildlab.geometry.attitude_uncertainty import tilt_from_roll_pitch
+from wildlab.geometry.covariances import tilt_from_roll_pitch
 
 # -- NMEA 0183
 

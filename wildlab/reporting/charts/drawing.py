@@ -18,7 +18,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import NullLocator
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.geometry.terrain import Terrain
+from wildlab.geometry.georeference import Terrain
 from wildlab.names import figure_name
 from wildlab.reporting.figures import (
     BLUE,

@@ -12,7 +12,7 @@ themselves.
 
 Back over the tracks, once the flight is over, which measurements were of which target stays as it was taken
 at the time, and the covariance knows nothing of what was taken wrongly: among many false measurements it is
-too small. Kinds of hull stay merged, and errors that last stay considered: see `wildlab.tracking.smoothing`.
+too small. Kinds of hull stay merged, and errors that last stay considered: see `wildlab.tracking.run`.
 """
 
 from __future__ import annotations
@@ -27,20 +27,8 @@ from scipy.spatial import cKDTree
 
 from wildlab.geometry.frames import Array
 from wildlab.tracking.association import association_probabilities
-from wildlab.tracking.many.target_model import (
-    LEAST_KIND,
-    ManySensorModel,
-    ManyTargetModel,
-    Scan,
-    at_least,
-    gather,
-    hull_noise,
-    largest_of,
-    near_side,
-    own_columns,
-    own_lasting,
-)
-from wildlab.tracking.many.tracks import (
+from wildlab.tracking.motion import white_acceleration
+from wildlab.tracking.multitarget_tracks import (
     Compared,
     Tracks,
     after_scan,
@@ -59,8 +47,20 @@ from wildlab.tracking.many.tracks import (
     weights,
     without_doubles,
 )
-from wildlab.tracking.motion import white_acceleration
-from wildlab.tracking.smoothing import lasting_errors, smooth_moments
+from wildlab.tracking.run import lasting_errors, smooth_moments
+from wildlab.tracking.target_model import (
+    LEAST_KIND,
+    ManySensorModel,
+    ManyTargetModel,
+    Scan,
+    at_least,
+    gather,
+    hull_noise,
+    largest_of,
+    near_side,
+    own_columns,
+    own_lasting,
+)
 
 #: How often what all tell each other is asked again. After the second time little changes.
 ROUNDS = 2
@@ -129,7 +129,7 @@ def moved_together(
     probabilities
         (T, 1 + M) by `compared`.
     gate
-        As in `wildlab.tracking.many.tracks.compare`.
+        As in `wildlab.tracking.multitarget_tracks.compare`.
     probable
         From likelihoods (T, K, M) to probabilities (T, 1 + M).
 
@@ -461,7 +461,7 @@ def smooth_many(
     density
         `ManyTargetModel.density` that it was run with.
     lasting_s
-        As `run_many` was given; behind it `wildlab.tracking.many.target_model.own_lasting` of its sensors.
+        As `run_many` was given; behind it `wildlab.tracking.target_model.own_lasting` of its sensors.
 
     Returns
     -------
