@@ -11,9 +11,8 @@ import numpy as np
 from benchmarks.timing import best_of
 from wildlab.detection.floating import FloatingThresholds, find_edges, find_objects
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.camera_poses import CameraPoses, Mount
 from wildlab.geometry.frames import euler_to_matrix
-from wildlab.geometry.mount import Mount
 from wildlab.simulation.scene.bodies import vessel
 from wildlab.simulation.scene.flights import CameraResponse, expose, sensor_of
 from wildlab.simulation.scene.render import Scene, Sea, render

@@ -16,14 +16,9 @@ import numpy as np
 from benchmarks.timing import best_of
 from tests.tracking.many.enumeration import association_probabilities_by_enumeration
 from wildlab.geometry.frames import Array
-from wildlab.tracking.many import (
-    POINT,
-    ManySensorModel,
-    ManyTargetModel,
-    Scan,
-    association_probabilities,
-    run_many,
-)
+from wildlab.tracking.association import association_probabilities
+from wildlab.tracking.multitarget import run_many
+from wildlab.tracking.target_model import POINT, ManySensorModel, ManyTargetModel, Scan
 
 TARGETS, MEASUREMENTS, SCANS = 50, 100, 60
 EYE = ManySensorModel("eye", 0.9, 50 / 1e6, 0.0, 1e9, 5.0, (0.0,), (0.0,), (0.0,))

@@ -16,22 +16,21 @@ from benchmarks.timing import best_of
 from tests.navigation import reference_mekf, reference_observer
 from wildlab.geometry.frames import (
     Array,
+    local_earth,
     matrix_to_euler,
     matrix_to_quaternion,
     ned_to_geodetic,
     quaternion_to_matrix,
 )
-from wildlab.geometry.gravity import local_earth
 from wildlab.navigation import mekf, observer
 from wildlab.navigation.aiding import Aiding, positions
 from wildlab.navigation.mekf import InitialState
-from wildlab.navigation.noise import STIM300
-from wildlab.navigation.strapdown import ImuSamples
-from wildlab.simulation import (
+from wildlab.navigation.strapdown import STIM300, ImuSamples
+from wildlab.simulation.courses import loiter_path
+from wildlab.simulation.trajectory import (
     angular_rates,
     attitude_along,
     fixed_wing_trajectory,
-    loiter_path,
     specific_forces,
 )
 

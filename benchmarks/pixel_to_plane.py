@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.timing import best_of
+from wildlab.geometry.camera_poses import Mount, camera_pose
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import pixel_to_plane
-from wildlab.geometry.mount import Mount, camera_pose
 from wildlab.studies.sensitivity import TAU2
 
 N = 1_000_000

@@ -11,10 +11,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from benchmarks.timing import best_of
-from wildlab.geometry.frames import Array, euler_to_matrix
-from wildlab.geometry.gravity import Earth, attraction, local_earth
-from wildlab.simulation import fixed_wing_trajectory, kernels, loiter_path
-from wildlab.simulation.trajectory import band_limited_disturbance
+from wildlab.geometry.frames import Array, Earth, attraction, euler_to_matrix, local_earth
+from wildlab.simulation import kernels
+from wildlab.simulation.courses import loiter_path
+from wildlab.simulation.trajectory import band_limited_disturbance, fixed_wing_trajectory
 
 DURATION, RATE, FRACTION = 1500, 250, 100
 WIND = np.array([4.0, -3.0, 0.0])

@@ -16,12 +16,10 @@ from numpy.typing import NDArray
 
 from benchmarks.timing import best_of
 from wildlab.geometry.camera import Camera
+from wildlab.geometry.camera_poses import R_MC_DOWN
 from wildlab.geometry.frames import euler_to_matrix
-from wildlab.geometry.georeference import pixel_rays
-from wildlab.geometry.line_of_sight import cast_rays, compare_angles
-from wildlab.geometry.mount import R_MC_DOWN
-from wildlab.geometry.terrain import Terrain, intersect_terrain
-from wildlab.geometry.viewsheds import SHORT_OF, lines_clear
+from wildlab.geometry.georeference import Terrain, intersect_terrain, pixel_rays
+from wildlab.geometry.viewsheds import SHORT_OF, cast_rays, compare_angles, lines_clear
 from wildlab.simulation.landscape import synthetic_landscape
 
 RAYS = 1_000_000

@@ -18,10 +18,9 @@ from filterpy.kalman import KalmanFilter
 
 from benchmarks.timing import best_of
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.camera_poses import CameraPoses, Mount
 from wildlab.geometry.frames import Array, euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
-from wildlab.geometry.mount import Mount
 from wildlab.tracking import sensors
 from wildlab.tracking.batch import BatchCamera, run_batch
 from wildlab.tracking.kalman import Considered, predict, update

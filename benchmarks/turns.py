@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from benchmarks.timing import best_of
-from wildlab.geometry.turns import between_attitudes
+from wildlab.geometry.kernels import between_attitudes
 
 COUNT = 100_000
 

@@ -13,18 +13,14 @@ LAZY = (
     "wildlab",
     "wildlab.evaluation",
     "wildlab.flight",
-    "wildlab.geometry",
     "wildlab.reporting",
-    "wildlab.simulation",
 )
 #: Rooms whose names are all documented, with parameters, what comes back, and an example where one helps.
-DOCUMENTED = (
-    *LAZY,
-    *("wildlab.navigation", "wildlab.tracking", "wildlab.tracking.many", "wildlab.tracking.particles"),
-)
+DOCUMENTED = (*LAZY, "wildlab.tracking.particles")
 #: Rooms whose examples are run.
 WITH_EXAMPLES = (
     *DOCUMENTED,
+    *("wildlab.geometry", "wildlab.navigation", "wildlab.tracking", "wildlab.simulation"),
     *("wildlab.analysis", "wildlab.detection", "wildlab.planning"),
     *("wildlab.api", "wildlab.sharing"),
 )

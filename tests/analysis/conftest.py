@@ -14,9 +14,9 @@ from tests.analysis.building import manifest_of, poses_table, surveyed
 from wildlab.analysis.georeference import Observations, georeference, observe, pose_errors, score_points
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
+from wildlab.geometry.camera_poses import Mount, camera_pose
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
-from wildlab.geometry.mount import Mount, camera_pose
 from wildlab.studies.sensitivity import TAU2
 
 SPEED = 15.0

@@ -13,9 +13,9 @@ import pandas as pd
 from tests.analysis.building import manifest_of, poses_table, surveyed
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
+from wildlab.geometry.camera_poses import Mount, camera_pose
 from wildlab.geometry.frames import euler_to_matrix, rotation_vector_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
-from wildlab.geometry.mount import Mount, camera_pose
 
 CAMERA = Camera(4056, 3040, 2400.0, 2400.0, 2028.0, 1520.0)
 STEP_S = 0.1

@@ -18,9 +18,8 @@ from wildlab.analysis.animal_images import (
 )
 from wildlab.analysis.plan_coverage import ExecutionErrors, displaced
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.camera_poses import R_MC_DOWN, CameraPoses
 from wildlab.geometry.frames import euler_to_matrix
-from wildlab.geometry.mount import R_MC_DOWN
 from wildlab.simulation.landscape import synthetic_landscape
 
 CAMERA = Camera(640, 480, 1267.0, 1117.0, 356.0, 216.6)

@@ -31,10 +31,9 @@ from wildlab.analysis.animal_trackers import (
 )
 from wildlab.analysis.plan_coverage import ExecutionErrors
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.camera_poses import R_MC_DOWN, CameraPoses
 from wildlab.geometry.covariances import gate_threshold
 from wildlab.geometry.frames import Array, euler_to_matrix
-from wildlab.geometry.mount import R_MC_DOWN
 from wildlab.planning.coverage import walks
 from wildlab.planning.gimbal import look_down
 from wildlab.planning.patterns import contains, rectangle

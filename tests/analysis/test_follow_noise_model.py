@@ -21,7 +21,7 @@ from wildlab.analysis.tracks.scans import predict_scan, scans_of
 from wildlab.analysis.tracks.tracker import track
 from wildlab.analysis.tracks.tuning import tune_flight
 from wildlab.flight.manifest import parse_settings
-from wildlab.geometry.attitude_uncertainty import pose_covariance
+from wildlab.geometry.covariances import pose_covariance
 from wildlab.geometry.frames import euler_to_matrix
 
 # --- what is believed ---------------------------------------------------------------------------------------

@@ -19,10 +19,9 @@ from wildlab.analysis.tracks.single_target import SensorTrack, ends_of, track_ta
 from wildlab.analysis.tracks.tracker import TrackingResult, estimates_table, score_tracks, seen_of, used_of
 from wildlab.flight.manifest import parse_settings
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.camera_poses import CameraPoses, Mount
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
-from wildlab.geometry.mount import Mount
 from wildlab.tracking.sensors import SensorMeasurements, merge
 
 CAMERA = Camera(640, 512, 1100.0, 1100.0, 320.0, 256.0)

@@ -16,7 +16,7 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix, rotation_vector_to_matrix
-from wildlab.geometry.terrain import Terrain, pixels_to_terrain
+from wildlab.geometry.georeference import Terrain, pixels_to_terrain
 
 MANIFEST = manifest_of(
     Camera(640, 512, 700.0, 700.0, 320.0, 256.0),

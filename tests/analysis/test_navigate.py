@@ -16,7 +16,7 @@ from wildlab.flight.manifest import ImuPart
 from wildlab.flight.schema import COVARIANCE_COLUMNS, LEVER_COLUMNS, SECOND_COLUMNS
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import matrix_to_rotation_vector
-from wildlab.navigation.magnetometer import earth_field
+from wildlab.navigation.aiding import earth_field
 from wildlab.simulation.twins import simulate_twin
 
 

@@ -16,7 +16,7 @@ from wildlab.analysis.plan_request import PlanRequest, look
 from wildlab.analysis.plan_result import missions, plan_result
 from wildlab.flight.writers import CHANGE_SPEED, mission_items
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.terrain import Terrain
+from wildlab.geometry.georeference import Terrain
 from wildlab.reporting.plan import with_words
 
 CAMERA = Camera(640, 512, 800.0, 800.0, 319.5, 255.5)

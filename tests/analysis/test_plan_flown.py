@@ -8,7 +8,7 @@ import pytest
 from wildlab.analysis.plan_coverage import ExecutionErrors, Looks, with_errors
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import matrix_to_rotation_vector
-from wildlab.geometry.terrain import Terrain
+from wildlab.geometry.georeference import Terrain
 from wildlab.planning.courses import fly
 from wildlab.planning.gimbal import camera_on_course, look_down, swing_yaw
 from wildlab.planning.patterns import lawn_mower

@@ -13,11 +13,10 @@ from wildlab.detection.centres import (
 )
 from wildlab.detection.floating import find_objects
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.camera_poses import CameraPoses, Mount
 from wildlab.geometry.covariances import inside_ellipse
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import georeference_pixels
-from wildlab.geometry.mount import Mount
 from wildlab.simulation.camera_detections import moments
 from wildlab.simulation.scene.bodies import vessel
 from wildlab.simulation.scene.flights import CameraResponse, expose, sensor_of

@@ -14,12 +14,10 @@ from wildlab.detection.flow import (
     nearest_by_ratio,
 )
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.camera_poses import CameraPoses, Mount
 from wildlab.geometry.covariances import inside_ellipse
-from wildlab.geometry.flow import CameraMotion, flow_between, motion_between
-from wildlab.geometry.flow_uncertainty import FlowErrors, mean_velocity
+from wildlab.geometry.flow import CameraMotion, FlowErrors, flow_between, mean_velocity, motion_between
 from wildlab.geometry.frames import euler_to_matrix, rotation_vector_to_matrix
-from wildlab.geometry.mount import Mount
 
 SHAPE = (160, 200)
 

@@ -18,7 +18,7 @@ from wildlab.flight.store import (
     save_flight,
     with_checksums,
 )
-from wildlab.geometry.terrain import Terrain
+from wildlab.geometry.georeference import Terrain
 
 
 @pytest.fixture

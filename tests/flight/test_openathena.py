@@ -16,8 +16,8 @@ from wildlab.flight.clocks import frame_poses
 from wildlab.flight.files import dump_toml
 from wildlab.flight.importing import import_flight
 from wildlab.flight.store import Flight, load_flight
+from wildlab.geometry.camera_poses import camera_pose
 from wildlab.geometry.frames import matrix_to_euler
-from wildlab.geometry.mount import camera_pose
 from wildlab.paths import DATA
 
 RECIPES = DATA / "recipes"

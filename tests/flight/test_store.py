@@ -19,7 +19,7 @@ from wildlab.flight import files
 from wildlab.flight.files import Strict, check_model, parse_toml, read_regular
 from wildlab.flight.schema import TABLES, conform
 from wildlab.flight.store import Flight, accept_changes, load_flight, save_flight
-from wildlab.geometry.terrain import Terrain
+from wildlab.geometry.georeference import Terrain
 
 
 def _same(one: Flight, other: Flight) -> None:

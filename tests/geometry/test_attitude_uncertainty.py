@@ -6,18 +6,17 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from wildlab.geometry.attitude_uncertainty import (
+from wildlab.geometry.camera import Camera
+from wildlab.geometry.camera_poses import CameraPoses, Mount
+from wildlab.geometry.covariances import (
     attitude_covariance,
+    ellipse_axes,
     level_axes,
     pose_covariance,
     tilt_and_heading,
 )
-from wildlab.geometry.camera import Camera
-from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.covariances import ellipse_axes
 from wildlab.geometry.frames import euler_to_matrix
-from wildlab.geometry.mount import Mount
-from wildlab.geometry.terrain import Terrain
+from wildlab.geometry.georeference import Terrain
 from wildlab.geometry.uncertainty import PoseErrors, ground_covariance, terrain_covariance
 
 FOCAL, MIDDLE, HEIGHT = 800.0, (1000.0, 750.0), 60.0

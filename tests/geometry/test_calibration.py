@@ -16,11 +16,10 @@ from wildlab.geometry.calibration import (
     georeference_calibrated,
     with_covariance,
 )
-from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.camera_poses import CameraPoses, Mount, mount_rotation
 from wildlab.geometry.corrections import CLOCK_STEP
 from wildlab.geometry.frames import euler_to_matrix, rotation_vector_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
-from wildlab.geometry.mount import Mount, mount_rotation
 from wildlab.studies.sensitivity import TAU2
 
 PLAIN = Mount("down")

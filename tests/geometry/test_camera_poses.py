@@ -5,10 +5,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.camera_poses import CameraPoses, Mount, camera_pose
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import georeference_pixels
-from wildlab.geometry.mount import Mount, camera_pose
 
 CAMERA = Camera(640, 512, 1159.2, 1167.8, 313.0, 265.0)
 MOUNT = Mount("down", tilt=0.1, misalignment=(0.03, -0.05, 0.02), lever_arm=(0.4, -0.1, 0.2))

@@ -4,19 +4,17 @@ import numpy as np
 import pytest
 
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.camera_poses import CameraPoses, Mount, mount_rotation
 from wildlab.geometry.flow import (
     CameraMotion,
+    FlowErrors,
     flow_between,
+    flow_jacobians,
     flow_matrix,
     gimbal_axes,
+    mean_velocity,
     motion_between,
     target_velocity,
-)
-from wildlab.geometry.flow_uncertainty import (
-    FlowErrors,
-    flow_jacobians,
-    mean_velocity,
     velocity_covariance,
 )
 from wildlab.geometry.frames import (
@@ -25,7 +23,6 @@ from wildlab.geometry.frames import (
     rotation_vector_to_matrix,
 )
 from wildlab.geometry.georeference import georeference_pixels, ground_to_pixel
-from wildlab.geometry.mount import Mount, mount_rotation
 
 CAMERA = Camera(640, 512, 760.0, 770.0, 313.0, 265.0, skew=1.5)
 BENT = Camera(640, 512, 760.0, 770.0, 313.0, 265.0, distortion=(-0.25, 0.08, 0.001, -0.002, 0.0))

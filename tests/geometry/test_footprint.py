@@ -5,11 +5,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wildlab.geometry.camera import Camera, in_image
-from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.camera_poses import CameraPoses, Mount
 from wildlab.geometry.frames import euler_to_matrix
-from wildlab.geometry.georeference import ground_to_pixel
-from wildlab.geometry.mount import Mount
-from wildlab.geometry.terrain import Terrain
+from wildlab.geometry.georeference import Terrain, ground_to_pixel
 from wildlab.geometry.viewsheds import footprint
 
 CAMERA = Camera(160, 128, 250.0, 220.0, 83.0, 60.0, 0.4, (0.1, 0.0, 0.0, 0.0, 0.0))

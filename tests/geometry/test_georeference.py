@@ -5,9 +5,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from wildlab.geometry.camera import Camera
+from wildlab.geometry.camera_poses import Mount, camera_pose, camera_rotation
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import BLOCK, ground_to_pixel, intersect_plane, pixel_rays, pixel_to_plane
-from wildlab.geometry.mount import Mount, camera_pose, camera_rotation
 from wildlab.studies.sensitivity import TAU2
 
 WIDE = Camera(640, 512, 500.0, 505.0, 322.0, 250.0, 1.5, (-0.2, 0.05, 0.001, -0.002, 0.0))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wildlab.geometry.gravity import attraction, local_earth
+from wildlab.geometry.frames import attraction, local_earth
 
 
 @pytest.mark.parametrize("offset", [(800.0, 0, 0), (0, -900.0, 0), (0, 0, -400.0), (500.0, 600.0, -300.0)])

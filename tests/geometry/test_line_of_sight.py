@@ -7,10 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wildlab.geometry.camera import Camera, in_image, project
-from wildlab.geometry.flodell import R_CAMERA, camera_rotation
-from wildlab.geometry.frames import euler_to_matrix
-from wildlab.geometry.line_of_sight import cast_rays, compare_angles, field_of_view, in_field_of_view
-from wildlab.geometry.terrain import Terrain
+from wildlab.geometry.frames import R_CAMERA, camera_rotation, euler_to_matrix
+from wildlab.geometry.georeference import Terrain
+from wildlab.geometry.viewsheds import cast_rays, compare_angles, field_of_view, in_field_of_view
 
 CAMERA = Camera(640, 512, 1000.0, 900.0, 320.0, 256.0)
 

@@ -6,10 +6,9 @@ import pytest
 from wildlab.errors import WildlabError
 from wildlab.geometry.calibration import mounting_from_points
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.camera_poses import CameraPoses, Mount, helgesen_misalignment
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
-from wildlab.geometry.mount import Mount, helgesen_misalignment
 
 CAMERA = Camera(640, 512, 1159.2, 1167.8, 313.0, 265.0)
 TURNED = Mount("down", misalignment=helgesen_misalignment(*np.radians([-1.7, 3.9, 1.9])))

@@ -9,11 +9,10 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.camera_poses import CameraPoses, Mount
 from wildlab.geometry.covariances import inside_ellipse
 from wildlab.geometry.frames import euler_to_matrix, rotation_vector_to_matrix
-from wildlab.geometry.mount import Mount
-from wildlab.geometry.terrain import Terrain, pixels_to_terrain
+from wildlab.geometry.georeference import Terrain, pixels_to_terrain
 from wildlab.geometry.uncertainty import (
     PoseErrors,
     ground_covariance,

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from wildlab.geometry.turns import between_attitudes
+from wildlab.geometry.kernels import between_attitudes
 
 
 def attitudes(count: int, seed: int) -> np.ndarray:

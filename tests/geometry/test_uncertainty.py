@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 
 from wildlab.geometry.camera import Camera, normalise
-from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.camera_poses import CameraPoses, Mount, camera_rotation, mount_rotation
 from wildlab.geometry.covariances import ellipse_axes, inside_ellipse
 from wildlab.geometry.frames import euler_to_matrix, rotation_vector_to_matrix
 from wildlab.geometry.georeference import georeference_pixels, pixel_to_plane
-from wildlab.geometry.mount import Mount, camera_rotation, mount_rotation
 from wildlab.geometry.uncertainty import (
     PoseErrors,
     ground_covariance,

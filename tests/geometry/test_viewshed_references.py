@@ -5,9 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from wildlab.geometry.line_of_sight import cast_rays, compare_angles
-from wildlab.geometry.terrain import Terrain
-from wildlab.geometry.viewsheds import lines_clear
+from wildlab.geometry.georeference import Terrain
+from wildlab.geometry.viewsheds import cast_rays, compare_angles, lines_clear
 
 rasterio = pytest.importorskip("rasterio")
 

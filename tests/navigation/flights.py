@@ -10,9 +10,9 @@ from scipy.integrate import cumulative_simpson
 from wildlab.geometry.frames import matrix_to_quaternion, rotation_vector_to_matrix
 from wildlab.navigation.aiding import Aiding, positions
 from wildlab.navigation.mekf import InitialState
-from wildlab.navigation.noise import ImuNoise
-from wildlab.navigation.strapdown import ImuSamples
-from wildlab.simulation import Motion, angular_rates, coordinated_attitude, gauss_markov, specific_forces
+from wildlab.navigation.strapdown import ImuNoise, ImuSamples
+from wildlab.simulation.error_models import gauss_markov
+from wildlab.simulation.trajectory import Motion, angular_rates, coordinated_attitude, specific_forces
 
 SPEED, GRAVITY = 18.0, 9.81
 #: Turns: from, to (s), rate (rad/s). Straight in between.

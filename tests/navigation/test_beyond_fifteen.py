@@ -13,12 +13,10 @@ from tests.navigation.test_mekf import (
     some_state,
     spoilt,
 )
-from wildlab.geometry.frames import rotation_vector_to_matrix
-from wildlab.geometry.gravity import flat_earth, local_earth
+from wildlab.geometry.frames import flat_earth, local_earth, rotation_vector_to_matrix
 from wildlab.navigation.aiding import GaussMarkov, positions, velocities
 from wildlab.navigation.mekf import Outages, prepare, run_mekf
-from wildlab.navigation.noise import AxisErrors
-from wildlab.navigation.strapdown import ImuSamples
+from wildlab.navigation.strapdown import AxisErrors, ImuSamples
 from wildlab.simulation.error_models import gauss_markov
 from wildlab.simulation.onboard_sensors import misaligned_triad
 

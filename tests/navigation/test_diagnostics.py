@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from tests.navigation.flights import GRAVITY, LEVERS, NOISE, attitude, begin, fixes, fly, spoil
-from wildlab.geometry.frames import matrix_to_quaternion, quaternion_to_matrix
-from wildlab.geometry.gravity import flat_earth
+from wildlab.geometry.frames import flat_earth, matrix_to_quaternion, quaternion_to_matrix
 from wildlab.navigation.mekf import run_mekf, signs_of_trouble
 from wildlab.navigation.strapdown import ImuSamples
 

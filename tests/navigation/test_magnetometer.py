@@ -5,7 +5,7 @@ import pytest
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import euler_to_matrix, matrix_to_rotation_vector
-from wildlab.navigation.magnetometer import earth_field, hard_iron, share_turned
+from wildlab.navigation.aiding import earth_field, hard_iron, share_turned
 from wildlab.navigation.strapdown import ImuSamples
 
 IRON = np.array([20.0, -5.0, 11.0])

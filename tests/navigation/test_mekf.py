@@ -17,8 +17,7 @@ from tests.navigation.flights import (
     moved,
     spoil,
 )  # fmt: skip
-from wildlab.geometry.frames import matrix_to_rotation_vector, quaternion_to_matrix
-from wildlab.geometry.gravity import flat_earth, local_earth
+from wildlab.geometry.frames import flat_earth, local_earth, matrix_to_rotation_vector, quaternion_to_matrix
 from wildlab.navigation import kernels
 from wildlab.navigation.aiding import positions, standstill, velocities
 from wildlab.navigation.mekf import (
@@ -31,8 +30,7 @@ from wildlab.navigation.mekf import (
     prepare,
     run_mekf,
 )  # fmt: skip
-from wildlab.navigation.noise import ImuNoise
-from wildlab.navigation.strapdown import ImuSamples
+from wildlab.navigation.strapdown import ImuNoise, ImuSamples
 
 EARTH = flat_earth(GRAVITY)
 

@@ -7,11 +7,12 @@ from tests.navigation import reference_observer
 from tests.navigation.flights import LEVERS, NOISE, attitude, begin, fixes, fly, moved, spoil
 from wildlab.geometry.frames import (
     geodetic_to_ecef,
+    local_earth,
     matrix_to_euler,
     matrix_to_rotation_vector,
+    normal_gravity,
     quaternion_to_matrix,
 )
-from wildlab.geometry.gravity import local_earth, normal_gravity
 from wildlab.navigation.aiding import velocities
 from wildlab.navigation.mekf import run_mekf
 from wildlab.navigation.observer import (

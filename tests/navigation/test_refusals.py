@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 
 from wildlab.errors import WildlabError
-from wildlab.geometry.gravity import flat_earth
+from wildlab.geometry.frames import flat_earth
 from wildlab.navigation.aiding import positions
 from wildlab.navigation.mekf import InitialState, run_mekf
-from wildlab.navigation.noise import STIM300
 from wildlab.navigation.observer import run_observer
-from wildlab.navigation.strapdown import ImuSamples
+from wildlab.navigation.strapdown import STIM300, ImuSamples
 
 T = np.arange(0, 1, 0.01)
 IMU = ImuSamples(T, np.tile([0, 0, -9.81], (len(T), 1)), np.zeros((len(T), 3)))

@@ -4,14 +4,20 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from wildlab.geometry.frames import matrix_to_quaternion, quaternion_to_matrix
-from wildlab.geometry.gravity import EARTH_RATE, flat_earth, local_earth, normal_gravity
+from wildlab.geometry.frames import (
+    EARTH_RATE,
+    flat_earth,
+    local_earth,
+    matrix_to_quaternion,
+    normal_gravity,
+    quaternion_to_matrix,
+)
 from wildlab.navigation.strapdown import ImuSamples, integrate_strapdown
-from wildlab.simulation import (
+from wildlab.simulation.courses import loiter_path
+from wildlab.simulation.trajectory import (
     angular_rates,
     attitude_along,
     fixed_wing_trajectory,
-    loiter_path,
     specific_forces,
 )
 

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from wildlab.geometry.camera import Camera
+from wildlab.geometry.camera_poses import Mount, camera_pose
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel, pixel_to_plane
-from wildlab.geometry.mount import Mount, camera_pose
 
 BENT = Camera(640, 512, 700.0, 705.0, 322.0, 250.0, 0.0, (-0.1, 0.05, 0.001, -0.002, 0.01))
 

@@ -5,8 +5,8 @@ from datetime import UTC, datetime
 import numpy as np
 import pytest
 
-from wildlab.tracking.many import association_probabilities
-from wildlab.tracking.many.tracks import compare, weights
+from wildlab.tracking.association import association_probabilities
+from wildlab.tracking.multitarget_tracks import compare, weights
 
 
 @pytest.mark.parametrize("seed", range(6))

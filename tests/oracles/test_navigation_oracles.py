@@ -7,13 +7,18 @@ from filterpy.kalman import KalmanFilter
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from wildlab.geometry.frames import geodetic_to_ecef, matrix_to_quaternion, quaternion_to_matrix
-from wildlab.geometry.gravity import flat_earth, local_earth, normal_gravity
+from wildlab.geometry.frames import (
+    flat_earth,
+    geodetic_to_ecef,
+    local_earth,
+    matrix_to_quaternion,
+    normal_gravity,
+    quaternion_to_matrix,
+)
 from wildlab.navigation.aiding import positions, velocities
 from wildlab.navigation.mekf import InitialState, run_mekf
-from wildlab.navigation.noise import ImuNoise
 from wildlab.navigation.observer import earth_axes
-from wildlab.navigation.strapdown import ImuSamples, integrate_strapdown
+from wildlab.navigation.strapdown import ImuNoise, ImuSamples, integrate_strapdown
 
 ORIGIN = (np.radians(59.0), np.radians(10.0), 120.0)
 

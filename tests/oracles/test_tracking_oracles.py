@@ -13,8 +13,7 @@ from wildlab.tracking import sensors as m
 from wildlab.tracking.batch import run_batch
 from wildlab.tracking.filters import run_unscented
 from wildlab.tracking.motion import constant_velocity, singer
-from wildlab.tracking.run import Start, run_filter
-from wildlab.tracking.smoothing import run_smoothed, smooth
+from wildlab.tracking.run import Start, run_filter, smooth
 
 CV = partial(constant_velocity, sd_acceleration=0.2)
 
@@ -142,8 +141,7 @@ def test_smoothed_runs_agree_with_filterpy(seed):
     z, R = rng.normal(0, 3, (40, 2)), np.array([covariance(rng, 2) for _ in range(40)])
     z[rng.random(40) < 0.2] = np.nan
     start = Start(0.0, rng.normal(size=6), covariance(rng, 6))
-    ours = run_smoothed(times, z, R, m.positions(), motion, start)
-    again = smooth(run_filter(times, z, R, m.positions(), motion, start), motion)
+    ours = smooth(run_filter(times, z, R, m.positions(), motion, start), motion)
     oracle = KalmanFilter(dim_x=6, dim_z=2)
     oracle.x, oracle.P, oracle.H = start.x.copy(), start.P.copy(), np.eye(2, 6)
     steps = [motion(dt) for dt in np.diff(times, prepend=0.0)]
@@ -156,6 +154,5 @@ def test_smoothed_runs_agree_with_filterpy(seed):
     x, P, *_ = oracle.rts_smoother(
         np.array(xs), np.array(Ps), Fs=[F for F, _ in steps], Qs=[Q for _, Q in steps]
     )
-    for found in (ours, again):
-        assert np.allclose(found.x, x, rtol=1e-8, atol=1e-8)
-        assert np.allclose(found.P, P, rtol=1e-8, atol=1e-8)
+    assert np.allclose(ours.x, x, rtol=1e-8, atol=1e-8)
+    assert np.allclose(ours.P, P, rtol=1e-8, atol=1e-8)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from wildlab.geometry.terrain import Terrain
+from wildlab.geometry.georeference import Terrain
 from wildlab.planning.legs import SearchSensor
 
 #: A kilometre each way about the origin.

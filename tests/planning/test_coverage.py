@@ -9,11 +9,9 @@ import pytest
 from numpy.typing import NDArray
 
 from wildlab.geometry.camera import Camera, in_image
-from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.camera_poses import R_MC_DOWN, CameraPoses, Mount
 from wildlab.geometry.frames import euler_to_matrix
-from wildlab.geometry.georeference import ground_to_pixel
-from wildlab.geometry.mount import R_MC_DOWN, Mount
-from wildlab.geometry.terrain import Terrain
+from wildlab.geometry.georeference import Terrain, ground_to_pixel
 from wildlab.geometry.viewsheds import lines_clear, widest_view
 from wildlab.planning.coverage import (
     Coverage,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.terrain import Terrain
+from wildlab.geometry.georeference import Terrain
 from wildlab.planning.gimbal import (
     NADIR,
     GimbalAngles,

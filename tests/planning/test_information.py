@@ -9,11 +9,10 @@ from hypothesis import strategies as st
 
 from tests.planning.ground import bearing_information, bearing_jacobian
 from wildlab.geometry.camera import Camera
+from wildlab.geometry.camera_poses import R_MC_DOWN
 from wildlab.geometry.frames import wrap
-from wildlab.geometry.mount import R_MC_DOWN
-from wildlab.planning.kernels import inverse_traces
 from wildlab.planning.legs import SearchSensor
-from wildlab.planning.planner import in_field_of_view
+from wildlab.planning.planner import in_field_of_view, inverse_traces
 
 SENSOR = SearchSensor(0.3, 0.2, sd=0.02, reach=100.0, nearest=1e-6)
 coordinate = st.floats(-300, 300)

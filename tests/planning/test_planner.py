@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from tests.planning.ground import FLAT, bearing_information, with_wall
-from wildlab.geometry.terrain import Terrain
-from wildlab.planning.kernels import gains_of_steps, inverse_traces
+from wildlab.geometry.georeference import Terrain
 from wildlab.planning.legs import (
     Flying,
     Leg,
@@ -19,7 +18,14 @@ from wildlab.planning.legs import (
     look_attitude,
     turn_between,
 )
-from wildlab.planning.planner import Horizon, InformationPlanner, detection_probability, initial_information
+from wildlab.planning.planner import (
+    Horizon,
+    InformationPlanner,
+    detection_probability,
+    gains_of_steps,
+    initial_information,
+    inverse_traces,
+)
 
 SENSOR = SearchSensor(0.3, 0.2, sd=0.2, reach=80.0, nearest=5.0)
 FLYING = Flying(5.0, 50.0)

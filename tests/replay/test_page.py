@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from wildlab.flight.clocks import longest_gap
-from wildlab.geometry.terrain import Terrain
+from wildlab.geometry.georeference import Terrain
 from wildlab.replay import scene as scenes
 from wildlab.replay.page import drawn, page
 from wildlab.replay.scene import (

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from tests.replay.recordings import read_recording
-from wildlab.geometry import Terrain, inside_ellipse
+from wildlab.geometry.covariances import inside_ellipse
+from wildlab.geometry.georeference import Terrain
 from wildlab.replay.recording import CORNERS, ellipse_rings, save_recording
 from wildlab.replay.scene import Sightings, scene_of
 from wildlab.simulation.twins import simulate_twin

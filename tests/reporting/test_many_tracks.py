@@ -18,7 +18,8 @@ from wildlab.reporting import figures
 from wildlab.reporting import many_tracks as page
 from wildlab.reporting.charts import tracks as charts
 from wildlab.reporting.figures import PHONE_WIDTH, least_size
-from wildlab.tracking.many import POINT, Hull, Shown
+from wildlab.tracking.multitarget import Shown
+from wildlab.tracking.target_model import POINT, Hull
 
 
 def shown_at(time: int, names: Iterable[int], x: np.ndarray, P: np.ndarray) -> Shown:

@@ -12,10 +12,9 @@ from scipy.spatial.transform import Rotation
 
 from wildlab.flight.manifest import make_manifest
 from wildlab.flight.store import Flight
-from wildlab.geometry.frames import Array
-from wildlab.geometry.gravity import local_earth
-from wildlab.geometry.terrain import Terrain
-from wildlab.navigation.magnetometer import earth_field
+from wildlab.geometry.frames import Array, local_earth
+from wildlab.geometry.georeference import Terrain
+from wildlab.navigation.aiding import earth_field
 
 HERE = (-24.873165, 31.486297, 317.43)
 EPOCH = datetime(2023, 9, 17, 0, 0, 0, tzinfo=UTC)

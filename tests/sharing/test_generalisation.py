@@ -21,7 +21,7 @@ from wildlab.errors import WildlabError
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import PREFERRED, Flight, save_flight
 from wildlab.geometry.camera import normalise
-from wildlab.geometry.gravity import local_earth
+from wildlab.geometry.frames import local_earth
 from wildlab.navigation.strapdown import ImuSamples, integrate_strapdown
 from wildlab.sharing.generalisation import (
     QUARTER,

@@ -13,7 +13,7 @@ from hypothesis import strategies as some
 
 from tests.sharing.canary import HERE, canary
 from tests.sharing.spelt import DATES, LATITUDE, LEAKS, LONGITUDE, NAME, NUMBER, SPELLINGS, WHEN, secrets
-from wildlab.geometry.gravity import normal_gravity
+from wildlab.geometry.frames import normal_gravity
 from wildlab.sharing.generalisation import generalise
 from wildlab.sharing.recomputation import Source
 from wildlab.sharing.scan import Secrets, SecretSearch, flight_secrets

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from tests.simulation.motions import restless_loiter
 from tests.simulation.test_twins import with_values
 from wildlab.flight.files import read_toml
-from wildlab.geometry.gravity import EARTH_RATE, Earth, normal_gravity
+from wildlab.geometry.frames import EARTH_RATE, Earth, normal_gravity
 from wildlab.simulation.courses import twin_trajectory
 from wildlab.simulation.onboard_sensors import (
     TriadDataSheet,

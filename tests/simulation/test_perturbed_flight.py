@@ -13,8 +13,8 @@ import pytest
 import wildlab
 from tests.simulation.test_twins import marks, with_values
 from wildlab.flight.store import save_flight
+from wildlab.geometry.camera_poses import camera_pose
 from wildlab.geometry.georeference import ground_to_pixel
-from wildlab.geometry.mount import camera_pose
 from wildlab.simulation.manifest import as_flown, true_mount, twin_manifest
 from wildlab.simulation.parameters import each_parameter, load_twin
 from wildlab.simulation.twins import OPTIONAL_TABLES, simulate

@@ -5,9 +5,9 @@ import pytest
 
 from tests.simulation.test_twins import marks, with_values, without_errors
 from wildlab.flight.clocks import gimbal_angles
+from wildlab.geometry.camera_poses import Mount, camera_pose
 from wildlab.geometry.frames import matrix_to_euler
 from wildlab.geometry.georeference import pixel_to_plane
-from wildlab.geometry.mount import Mount, camera_pose
 from wildlab.geometry.viewsheds import lines_clear
 from wildlab.simulation.courses import Laps, leg_headings, rows, survey_course, twin_trajectory
 from wildlab.simulation.landscape import twin_land

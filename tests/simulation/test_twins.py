@@ -10,6 +10,7 @@ from wildlab.errors import WildlabError
 from wildlab.flight.checks.check import check_flight
 from wildlab.flight.clocks import frame_times, poses_at
 from wildlab.flight.store import load_flight, save_flight
+from wildlab.geometry.camera_poses import camera_pose
 from wildlab.geometry.frames import (
     euler_to_matrix,
     matrix_to_euler,
@@ -17,7 +18,6 @@ from wildlab.geometry.frames import (
     quaternion_to_matrix,
 )
 from wildlab.geometry.georeference import ground_to_pixel, pixel_to_plane
-from wildlab.geometry.mount import camera_pose
 from wildlab.simulation.courses import loiter_centre, twin_trajectory
 from wildlab.simulation.onboard_sensors import payload_boresight
 from wildlab.simulation.parameters import load_twin

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from tests.simulation.test_twins import assert_in_image, marks, with_values
+from wildlab.geometry.camera_poses import camera_pose
 from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
 from wildlab.geometry.georeference import pixel_to_plane
-from wildlab.geometry.mount import camera_pose
 from wildlab.simulation.camera_detections import Exposures, exposure_times
 from wildlab.simulation.courses import twin_trajectory
 from wildlab.simulation.error_models import stream

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.mount import R_MC_DOWN
+from wildlab.geometry.camera_poses import R_MC_DOWN
 from wildlab.simulation.scene.drawn import animal
 from wildlab.simulation.scene.flights import IDEAL, expose, sensor_of, to_counts
 from wildlab.simulation.scene.land import EVEN_LAND, LandScene, Weather, render_land

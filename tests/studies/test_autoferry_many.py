@@ -12,8 +12,8 @@ from wildlab.evaluation.identities import Moment, compare_identities
 from wildlab.flight.files import dump_toml
 from wildlab.flight.manifest import parse_settings
 from wildlab.reporting.report import open_report
-from wildlab.studies import autoferry_many
-from wildlab.studies.autoferry_many import Tuned, anees_of, draw, order
+from wildlab.studies import autoferry
+from wildlab.studies.autoferry import Tuned, anees_of, draw, order
 
 OFFSETS = {"lidar": -1.0, "radar": -2.0, "ir": -0.5, "eo": 0.0}
 ERRORS = {
@@ -49,7 +49,7 @@ def test_what_it_was_tuned_on_is_in_no_median():
             for case, value in zip(("s1", "s2", "s3"), values, strict=True)
         ]
     )
-    spread = autoferry_many.over_scenarios(rows, "s1")
+    spread = autoferry.over_scenarios(rows, "s1")
     assert {mode: spread[f"elsewhere/{mode}", "gospa_median"].median() for mode in modes} == {
         "radar": 8.0, "lidar": 5.0, "both": 8.0,
     }  # fmt: skip
@@ -67,7 +67,7 @@ def test_what_it_was_tuned_on_is_in_no_median():
 
 def recorded_of(rows, first):
     report = open_report(study="autoferry-many", flight="", kind="logged", seed=1, seeds=None, out="")
-    autoferry_many.record_scores(report, rows, first)
+    autoferry.record_scores(report, rows, first)
     return report.recorded
 
 
@@ -91,9 +91,9 @@ def test_what_is_assumed_of_the_truth_chooses_no_draw():
 
 @pytest.mark.slow
 def test_scenarios_are_followed_by_what_one_teaches(scenario, tunings, monkeypatch):  # type: ignore[no-untyped-def]
-    monkeypatch.setattr(autoferry_many, "tune_sensor", lambda flight, sensor: tunings[sensor])
-    errors = autoferry_many.errors_of(scenario(2))
+    monkeypatch.setattr(autoferry, "tune_sensor", lambda flight, sensor: tunings[sensor])
+    errors = autoferry.errors_of(scenario(2))
     assert -2.5 < errors["radar"].offset_s < -1.5 and -1.5 < errors["lidar"].offset_s < -0.5
     assert all(0.5 < errors[name].next_correlation < 1 for name in ("lidar", "radar"))
-    for mode, best in autoferry_many.tune(scenario(2), draws=2, seed=1).items():
-        assert autoferry_many.follow_mode(scenario(3), mode, best.settings) is not None
+    for mode, best in autoferry.tune_modes(scenario(2), draws=2, seed=1).items():
+        assert autoferry.follow_mode(scenario(3), mode, best.settings) is not None

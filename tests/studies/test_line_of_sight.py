@@ -5,8 +5,8 @@ import pandas as pd
 import pytest
 
 from tests.studies.claims import checks_of
-from wildlab.geometry.line_of_sight import field_of_view, in_field_of_view
-from wildlab.geometry.terrain import Terrain
+from wildlab.geometry.georeference import Terrain
+from wildlab.geometry.viewsheds import field_of_view, in_field_of_view
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.landscape import grow_trees, synthetic_landscape
 from wildlab.studies.line_of_sight import (

@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 
 from wildlab.geometry.camera import Camera
+from wildlab.geometry.camera_poses import Mount, helgesen_misalignment
 from wildlab.geometry.frames import euler_to_matrix, matrix_to_euler
-from wildlab.geometry.mount import Mount, helgesen_misalignment
 from wildlab.reporting.published import judge, load_published
 from wildlab.studies.sensitivity import (
     IMAGE_CENTRE,
@@ -51,8 +51,8 @@ def test_a_shift_of_the_airframe_shifts_the_point():
 
 def test_a_yaw_error_turns_the_point_about_the_foot():
     """3 deg of yaw in level flight moves the point along a circle about the point below the airframe."""
+    from wildlab.geometry.camera_poses import camera_pose
     from wildlab.geometry.georeference import pixel_to_plane
-    from wildlab.geometry.mount import camera_pose
 
     yaw = np.radians(3.0)
     shift = displacement(

@@ -9,7 +9,7 @@ from wildlab.detection.floating import FloatingObjects, FloatingThresholds, find
 from wildlab.evaluation.intervals import share_interval
 from wildlab.evaluation.shares import FAILS, HOLDS, UNDECIDED, decide_check
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.mount import R_MC_DOWN
+from wildlab.geometry.camera_poses import R_MC_DOWN
 from wildlab.reporting.published import load_claims, load_published
 from wildlab.simulation.scene.bodies import rectangle
 from wildlab.simulation.scene.flights import IDEAL, expose, sensor_of

@@ -7,9 +7,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from wildlab.geometry.camera import Camera, project
-from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.camera_poses import CameraPoses, Mount
 from wildlab.geometry.frames import euler_to_matrix
-from wildlab.geometry.mount import Mount
 
 CAMERA = Camera(640, 512, 1100.0, 1120.0, 318.0, 250.0)
 CROOKED = Camera(640, 512, 1100.0, 1120.0, 318.0, 250.0, 1.5, (-0.2, 0.05, 1e-3, -2e-3, 0.01))

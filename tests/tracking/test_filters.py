@@ -15,11 +15,10 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.frames import wrap
 from wildlab.tracking import sensors as m
 from wildlab.tracking.filters import run_coloured, run_imm, run_unscented, thin
-from wildlab.tracking.kalman import Considered
+from wildlab.tracking.kalman import Considered, errors_of
 from wildlab.tracking.motion import constant_velocity, rest, singer, white_acceleration
-from wildlab.tracking.run import Start, run_filter, start_from_first
+from wildlab.tracking.run import Start, run_filter, smooth, start_from_first
 from wildlab.tracking.sensors import predict_range_bearing
-from wildlab.tracking.smoothing import run_smoothed, smooth
 
 ROUGH = partial(constant_velocity, sd_acceleration=0.3)
 SINGER = partial(singer, alpha=0.1, variance=0.2)
@@ -240,6 +239,11 @@ def linear_run(seed, n=25):
     return times, z, np.array([np.diag(rng.uniform(0.5, 4, 2)) for _ in range(n)])
 
 
+def run_smoothed(times, z, R, sensor, motion, start, pose=None):
+    track = run_filter(times, z, R, sensor, motion, start, pose=pose)
+    return smooth(track, motion, errors_of(pose, sensor, len(track.nis)))
+
+
 def everything_at_once(times, z, R, motion, start):
     """Means and covariances of all states given all measurements, as one Gaussian: no recursion at all."""
     n, N = len(start.x), len(times)
@@ -267,7 +271,6 @@ def test_it_is_the_mean_given_all_measurements(motion, seed):
     track = run_filter(times, z, R, m.positions(), motion, START)
     for found in (
         smooth(track, motion),
-        run_smoothed(times, z, R, m.positions(), motion, START),
         # With nothing that could be wrong the joint smoother is the same.
         run_smoothed(times, z, R, measured_from([0, 0]), motion, START, pose=consider({"heading": 0.0})),
     ):

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.tracking.poses import GENERATORS
-from wildlab.tracking.many.tracks import count_interval, count_probabilities
 from wildlab.tracking.motion import constant_velocity, in_steps
+from wildlab.tracking.multitarget_tracks import count_interval, count_probabilities
 from wildlab.tracking.particles import (
     Cloud,
     draw,

@@ -55,8 +55,8 @@ from wildlab.flight.calibration_files import (
 from wildlab.flight.clocks import truth_at
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
-from wildlab.geometry.attitude_uncertainty import tilt_and_heading
 from wildlab.geometry.corrections import Calibration, apply_calibration, calibrated_camera
+from wildlab.geometry.covariances import tilt_and_heading
 from wildlab.geometry.frames import (
     Array,
     euler_to_matrix,

@@ -12,8 +12,7 @@ from wildlab.analysis.plan_coverage import ExecutionErrors
 from wildlab.geometry.camera import Camera, in_image, normalise
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, Indices, Mask, euler_to_matrix
-from wildlab.geometry.georeference import ground_to_pixel, pixel_rays
-from wildlab.geometry.terrain import Terrain, intersect_terrain
+from wildlab.geometry.georeference import Terrain, ground_to_pixel, intersect_terrain, pixel_rays
 from wildlab.geometry.uncertainty import PoseErrors, ground_covariance
 from wildlab.geometry.viewsheds import lines_clear
 

@@ -28,7 +28,7 @@ from wildlab.analysis.plan_coverage import ExecutionErrors, displaced, drawn_err
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.covariances import gate_threshold
 from wildlab.geometry.frames import Array, Indices, Mask
-from wildlab.geometry.terrain import Terrain
+from wildlab.geometry.georeference import Terrain
 from wildlab.planning.gimbal import GimbalAngles, camera_on_course
 from wildlab.planning.planner import SEARCH, all_positioned, best_goal
 from wildlab.tracking.association import global_nearest

@@ -34,7 +34,7 @@ from wildlab.geometry.camera_clock import (
     clock_by_points,
     translation_over_ground,
 )
-from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.camera_poses import CameraPoses, camera_rotation
 from wildlab.geometry.frames import Array, Indices, Mask, matrix_to_rotation_vector
 from wildlab.geometry.intrinsics import (
     FEWEST,
@@ -46,7 +46,6 @@ from wildlab.geometry.intrinsics import (
     parameters_of,
     view_errors,
 )
-from wildlab.geometry.mount import camera_rotation
 from wildlab.names import listed
 
 #: A view disagrees where its held-out error is this many times the median, and this many robust standard

@@ -20,17 +20,15 @@ from wildlab.evaluation.intervals import time_blocks
 from wildlab.files import write_atomic, write_csv
 from wildlab.flight.clocks import between, frame_times, gimbal_angles, pose_finder, poses_at, truth_at
 from wildlab.flight.store import Flight
-from wildlab.geometry.attitude_uncertainty import pose_covariance
 from wildlab.geometry.calibration import Calibration, PosesAt, calibrated_poses
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.covariances import ellipse_axes, inside_ellipse
+from wildlab.geometry.covariances import ellipse_axes, inside_ellipse, pose_covariance
 from wildlab.geometry.frames import Array, Indices, Mask, ned_to_geodetic
-from wildlab.geometry.georeference import RAY_STATUS, georeference_pixels
-from wildlab.geometry.terrain import Terrain, pixels_to_terrain
+from wildlab.geometry.georeference import RAY_STATUS, Terrain, georeference_pixels, pixels_to_terrain
 from wildlab.geometry.uncertainty import PoseErrors, ground_covariance, terrain_covariance
 
 #: Standard deviations assumed where neither the log nor the manifest states one; those of the attitude as in
-#: `wildlab.geometry.attitude_uncertainty`.
+#: `wildlab.geometry.covariances`.
 USUAL = {
     "pixel_px": 2.0,
     "position_horizontal_m": 2.0,

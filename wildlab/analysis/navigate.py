@@ -17,13 +17,10 @@ from wildlab.flight.checks.inertial import FLYING
 from wildlab.flight.clocks import covariance_columns, covariances, frame_times, gnss_times, poses_at
 from wildlab.flight.schema import LEVER_COLUMNS, SECOND_COLUMNS
 from wildlab.flight.store import Flight
-from wildlab.geometry.frames import Array
-from wildlab.geometry.gravity import local_earth
-from wildlab.navigation.aiding import Aiding, positions, velocities
+from wildlab.geometry.frames import Array, local_earth
+from wildlab.navigation.aiding import Aiding, earth_field, hard_iron, positions, share_turned, velocities
 from wildlab.navigation.alignment import align_at_rest, align_from_baseline, align_from_course, find_rest
-from wildlab.navigation.magnetometer import earth_field, hard_iron, share_turned
 from wildlab.navigation.mekf import InitialState, pose_covariance, run_mekf, signs_of_trouble
-from wildlab.navigation.noise import AxisErrors, ImuNoise, with_turn_on
 from wildlab.navigation.observer import (
     Gains,
     baseline_reference,
@@ -31,7 +28,7 @@ from wildlab.navigation.observer import (
     field_reference,
     run_observer,
 )
-from wildlab.navigation.strapdown import ImuSamples
+from wildlab.navigation.strapdown import AxisErrors, ImuNoise, ImuSamples, with_turn_on
 
 POSITION = ["north_m", "east_m", "down_m"]
 VELOCITY = ["v_north_m_s", "v_east_m_s", "v_down_m_s"]

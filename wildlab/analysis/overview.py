@@ -21,8 +21,7 @@ from wildlab.flight.checks.check import Finding, Use, find, usable_for
 from wildlab.flight.clocks import frame_poses, frame_times, gimbal_angles, gnss_times, longest_gap
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array, Mask, matrix_to_euler, quaternion_to_matrix
-from wildlab.geometry.georeference import georeference_pixels, pixel_rays
-from wildlab.geometry.terrain import pixels_to_terrain
+from wildlab.geometry.georeference import georeference_pixels, pixel_rays, pixels_to_terrain
 
 #: Rays along each side of an image, and how far below the horizon (rad) all of them have to point: flatter
 #: ones end anywhere.

@@ -28,7 +28,7 @@ from wildlab.flight.manifest import TerrainSays
 from wildlab.flight.readers.vector import Areas, read_areas
 from wildlab.flight.terrain import CutOut, terrain_about
 from wildlab.geometry.frames import Array, Indices, Mask, geodetic_to_ned
-from wildlab.geometry.terrain import Terrain
+from wildlab.geometry.georeference import Terrain
 from wildlab.planning.courses import Course, fly, no_steeper
 from wildlab.planning.patterns import Pattern, contains, lawn_mowers
 

@@ -20,8 +20,7 @@ from wildlab.analysis.plan_request import FURTHEST, simplified
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, Indices, Mask, euler_to_matrix, rotation_vector_to_matrix
-from wildlab.geometry.georeference import pixel_rays
-from wildlab.geometry.terrain import Terrain, intersect_terrain
+from wildlab.geometry.georeference import Terrain, intersect_terrain, pixel_rays
 from wildlab.geometry.viewsheds import lines_clear
 from wildlab.planning.coverage import Coverage, from_sightings, see
 from wildlab.planning.gimbal import (

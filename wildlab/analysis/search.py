@@ -15,7 +15,7 @@ import numpy as np
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array, Indices, Mask
-from wildlab.geometry.terrain import Terrain
+from wildlab.geometry.georeference import Terrain
 from wildlab.geometry.viewsheds import lines_clear
 from wildlab.planning.legs import Flying, Leg, PatternPlanner, Platform, RandomWalk, SearchSensor
 from wildlab.planning.patterns import contains, lawn_mower

@@ -15,7 +15,7 @@ from wildlab.errors import WildlabError
 from wildlab.flight.schema import COVARIANCE_COLUMNS, POSITION, QUATERNION
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array, Indices, quaternion_to_matrix
-from wildlab.geometry.turns import between_attitudes
+from wildlab.geometry.kernels import between_attitudes
 
 #: Stretches without a sample up to this long are bridged by interpolation, unless the caller says otherwise;
 #: longer ones where the log's own rate explains them, up to so many of its usual steps: none is missing.

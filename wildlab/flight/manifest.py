@@ -25,8 +25,8 @@ from wildlab.flight.files import (
     read_toml,
 )
 from wildlab.geometry.camera import Camera
+from wildlab.geometry.camera_poses import Mount
 from wildlab.geometry.frames import Origin
-from wildlab.geometry.mount import Mount
 
 Angle = Annotated[float, Field(ge=-360, le=360)]
 Spread = Annotated[float, Field(gt=0, le=1e6)]
@@ -91,7 +91,7 @@ class CameraPart(Strict):
 
 
 class MountPart(Strict):
-    """How the camera is fixed to the airframe: see `wildlab.geometry.mount.Mount`.
+    """How the camera is fixed to the airframe: see `wildlab.geometry.camera_poses.Mount`.
 
     ``poses`` names the nav source whose axes it counts from, where the flight has several: that of the
     vehicle and that of a camera with a log of its own take different mounts. Left out, it holds for all.
@@ -228,7 +228,7 @@ class VerticalPart(Strict):
 class UncertaintyPart(Strict):
     """Standard deviations to assume where the log has none. Absent = not assumed.
 
-    ``tilt_deg`` and ``heading_deg``: see `wildlab.geometry.attitude_uncertainty`.
+    ``tilt_deg`` and ``heading_deg``: see `wildlab.geometry.covariances`.
     """
 
     pixel_px: Spread | None = None
@@ -391,7 +391,7 @@ class HullPart(Strict):
 
 
 class ManyTargetsPart(Strict):
-    """What a tracker of many targets is told, see `wildlab.tracking.many.target_model.ManyTargetModel`."""
+    """What a tracker of many targets is told, see `wildlab.tracking.target_model.ManyTargetModel`."""
 
     hulls: Annotated[tuple[HullPart, ...], Field(max_length=MOST_HULLS)] = ()
     lifetime_s: Above | None = None
@@ -412,7 +412,7 @@ class ManyTargetsPart(Strict):
 
 
 class ManySensorPart(Strict):
-    """What it is told of a sensor, see `wildlab.tracking.many.target_model.ManySensorModel`; those of hulls
+    """What it is told of a sensor, see `wildlab.tracking.target_model.ManySensorModel`; those of hulls
     have one number for each kind."""
 
     detection: Probability | None = None

@@ -43,7 +43,7 @@ from wildlab.flight.recipes import (
     YawFromBearing,
 )
 from wildlab.flight.schema import POSITION, QUATERNION, VELOCITY, Dimension
-from wildlab.geometry.attitude_uncertainty import pose_covariance, tilt_from_roll_pitch
+from wildlab.geometry.covariances import pose_covariance, tilt_from_roll_pitch
 from wildlab.geometry.frames import (
     R_NED_ENU,
     Array,

@@ -236,7 +236,7 @@ class Spreads(Ruled):
     """Standard deviations of each pose, as the log has them.
 
     Of the attitude a tilt and a heading, or roll, pitch and yaw, which are read as such by the rule of
-    `wildlab.geometry.attitude_uncertainty`.
+    `wildlab.geometry.covariances`.
     """
 
     horizontal: Length

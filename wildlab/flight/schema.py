@@ -18,7 +18,7 @@ import numpy as np
 import pandas as pd
 
 from wildlab.errors import WildlabError
-from wildlab.geometry.gravity import STANDARD_GRAVITY
+from wildlab.geometry.frames import STANDARD_GRAVITY
 from wildlab.paths import DATA
 
 DType = Literal["float", "text"]

@@ -52,7 +52,7 @@ from wildlab.flight.manifest import (
 )
 from wildlab.flight.schema import NAV, TABLES, Table, conform
 from wildlab.geometry.frames import Indices
-from wildlab.geometry.terrain import Terrain
+from wildlab.geometry.georeference import Terrain
 from wildlab.summary_table import Brief, Summary
 
 TERRAIN = "terrain.tif"

@@ -23,7 +23,7 @@ from wildlab.flight.readers.terrain import ElevationMap, Heights, open_elevation
 from wildlab.flight.schema import POSITION
 from wildlab.flight.store import MOST_NODES, Flight
 from wildlab.geometry.frames import Array, Indices, Mask, Origin, geodetic_to_ned, ned_to_geodetic
-from wildlab.geometry.terrain import Terrain
+from wildlab.geometry.georeference import Terrain
 from wildlab.names import listed
 
 #: Nodes of the grid that are worked on at once.

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError
-from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.camera_poses import CameraPoses, Mount
 from wildlab.geometry.corrections import (
     BORESIGHT,
     BOUNDS,
@@ -33,7 +33,6 @@ from wildlab.geometry.corrections import (
 from wildlab.geometry.covariances import independent_count
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import georeference_pixels
-from wildlab.geometry.mount import Mount
 from wildlab.geometry.robust import fit_linear, student_cost, student_scale
 
 __all__ = [
@@ -451,7 +450,8 @@ def mounting_from_points(
 
     Examples
     --------
-    >>> from wildlab.geometry import Camera, ground_to_pixel
+    >>> from wildlab.geometry.camera import Camera
+    >>> from wildlab.geometry.georeference import ground_to_pixel
     >>> points = np.array([[x, y, 0.0] for x in (-0.2, 0, 0.2) for y in (-0.2, 0, 0.2)])
     >>> camera, p, level = Camera(640, 512, 1160.0, 1160.0, 313.0, 265.0), np.array([0, 0, -1.2]), np.eye(3)
     >>> turned = CameraPoses(camera, Mount(misalignment=(0.03, 0.07, -0.03)), p, level)

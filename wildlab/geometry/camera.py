@@ -161,7 +161,7 @@ def undistort(xy_distorted: ArrayLike, distortion: ArrayLike, tolerance: float =
     -------
     (N, 2).
     """
-    from wildlab.geometry.lens_kernels import undistort_rows  # the compiler takes a while to load
+    from wildlab.geometry.kernels import undistort_rows  # the compiler takes a while to load
 
     xy = np.array(xy_distorted, float)
     k1, k2, p1, p2, k3 = np.asarray(distortion, float)

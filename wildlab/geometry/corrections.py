@@ -13,10 +13,9 @@ from numpy.typing import ArrayLike
 from scipy.special import stdtrit
 
 from wildlab.geometry.camera import Camera, normalise
-from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.camera_poses import CameraPoses, Mount
 from wildlab.geometry.frames import Array, euler_to_matrix, matrix_to_euler
 from wildlab.geometry.georeference import georeference_pixels
-from wildlab.geometry.mount import Mount
 from wildlab.geometry.uncertainty import ground_jacobians
 
 #: Every parameter that can be estimated, in the order in which they are kept when the data cannot carry all;

@@ -5,14 +5,26 @@ those of H 5.2: Euler angles in zyx order (H 5.10), quaternions scalar first, Ha
 
 The print of H (5.10) has two slips in its first row; it is the standard zyx matrix
 ``R_z(yaw) R_y(pitch) R_x(roll)`` that is meant, and that is what stands here.
+
+Gravity and the turning of the Earth, as a local frame n sees them.
+
+The conventions of Flodell and Christensson (F), converted where they enter.
+
+F works in east-north-up, and its camera looks along x with y right and z down (F table 2.1). Everything
+inside wildlab is north-east-down with the camera looking along z. F also replaces the exact conversion of
+WGS84 coordinates by a linear one; it is kept because it is a formula of the thesis, beside its error.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 import pymap3d
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
+
+from wildlab.errors import WildlabError
 
 #: Numbers, truth values, and rows or counts: of any shape.
 Array = NDArray[np.float64]
@@ -315,3 +327,217 @@ def wrap(angle: ArrayLike) -> Array:
     20.0
     """
     return np.asarray((np.asarray(angle, float) + np.pi) % (2 * np.pi) - np.pi)
+
+
+#: Of the Earth, rad/s (WGS84).
+EARTH_RATE = 7.292115e-5
+#: What data sheets mean by g, m/s^2, and what gravity is taken to be where nothing better is known.
+STANDARD_GRAVITY, USUAL_GRAVITY = 9.80665, 9.81
+
+# WGS84: semi-major axis (m), first eccentricity squared, flattening, gravity at the equator (m/s^2),
+# Somigliana's constant, and the ratio of centrifugal force to gravity at the equator.
+_A, _E2, _FLATTENING = 6378137.0, 6.69437999014e-3, 1 / 298.257223563
+_GAMMA, _SOMIGLIANA, _M = 9.7803253359, 1.931852652458e-3, 3.449786506841e-3
+
+
+class Earth(NamedTuple):
+    """What turns, and pulls, in a frame n that stands still on the ground at its origin.
+
+    Attributes
+    ----------
+    gravity
+        At the origin, m/s^2.
+    gradient
+        How much it grows per metre downwards, 1/s^2.
+    curvature
+        One over the Earth's radius, 1/m: away from the origin the plumb line leans back towards it.
+    rate
+        Angular rate of n, in n, (3,) rad/s.
+    """
+
+    gravity: float
+    gradient: float
+    curvature: float
+    rate: tuple[float, float, float]
+
+    def as_array(self) -> Array:
+        """Gravity, gradient, curvature and the three parts of the rate, (6,), as compiled code takes them."""
+        return np.array([self.gravity, self.gradient, self.curvature, *self.rate])
+
+
+def normal_gravity(latitude: ArrayLike, height: ArrayLike = 0.0) -> Array:
+    """Gravity of the WGS84 ellipsoid, m/s^2: Somigliana's formula, to second order in the height.
+
+    Parameters
+    ----------
+    latitude, height
+        Radians, and metres above the ellipsoid; (N,) or scalars.
+
+    Returns
+    -------
+    (N,) m/s^2.
+
+    Examples
+    --------
+    >>> print(f"{normal_gravity(np.radians(45.0)):.4f} m/s^2")
+    9.8062 m/s^2
+    """
+    s2 = np.sin(np.asarray(latitude, float)) ** 2
+    h = np.asarray(height, float) / _A
+    on_ellipsoid = _GAMMA * (1 + _SOMIGLIANA * s2) / np.sqrt(1 - _E2 * s2)
+    return np.asarray(on_ellipsoid * (1 - 2 * (1 + _FLATTENING + _M - 2 * _FLATTENING * s2) * h + 3 * h**2))
+
+
+def local_earth(latitude: float, height: float = 0.0) -> Earth:
+    """The Earth at a place: normal gravity that falls with height and leans with distance, and its rotation.
+
+    Parameters
+    ----------
+    latitude
+        Radians.
+    height
+        Metres above the ellipsoid.
+
+    Returns
+    -------
+    The Earth as n sees it.
+
+    Raises
+    ------
+    WildlabError
+        Where the latitude is not within a quarter turn, as when it is given in degrees.
+    """
+    if not abs(latitude) <= np.pi / 2 or not np.isfinite(height):
+        raise WildlabError(
+            f"no place on Earth has the latitude {latitude} rad and the height {height} m",
+            "give the latitude in radians and the height in metres",
+            field="origin",
+        )
+    gradient = float(normal_gravity(latitude, height - 0.5) - normal_gravity(latitude, height + 0.5))
+    rate = (EARTH_RATE * float(np.cos(latitude)), 0.0, -EARTH_RATE * float(np.sin(latitude)))
+    return Earth(float(normal_gravity(latitude, height)), gradient, 1 / 6371e3, rate)
+
+
+def flat_earth(gravity: float = USUAL_GRAVITY) -> Earth:
+    """Frame n as an inertial one with the same gravity everywhere, as in H 7.3.2.
+
+    Parameters
+    ----------
+    gravity
+        m/s^2.
+
+    Returns
+    -------
+    An Earth that neither turns nor curves.
+    """
+    return Earth(gravity, 0.0, 0.0, (0.0, 0.0, 0.0))
+
+
+def attraction(earth: Earth, p_n: ArrayLike) -> Array:
+    """Gravity at positions in n.
+
+    Parameters
+    ----------
+    earth
+        As n sees it.
+    p_n
+        (N, 3) metres in n.
+
+    Returns
+    -------
+    (N, 3) m/s^2 in n.
+    """
+    p = np.asarray(p_n, float)
+    down = earth.gravity + earth.gradient * p[..., 2]
+    return np.asarray(
+        down[..., None]
+        * np.stack(
+            [-earth.curvature * p[..., 0], -earth.curvature * p[..., 1], np.ones(p.shape[:-1])], axis=-1
+        )
+    )
+
+
+#: Takes a vector from F's camera axes (x forward, y right, z down) to c (x right, y down, z forward).
+R_CAMERA: Array = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+
+
+def metres_per_degree(latitude: float) -> tuple[float, float]:
+    """``k_phi`` and ``k_lambda`` of F (2.3): metres per degree of latitude and of longitude.
+
+    Parameters
+    ----------
+    latitude
+        Radians.
+
+    Returns
+    -------
+    Metres per degree of latitude, and of longitude.
+    """
+    k_phi = (
+        111132.92
+        - 559.82 * np.cos(2 * latitude)
+        + 1.175 * np.cos(4 * latitude)
+        - 0.0023 * np.cos(6 * latitude)
+    )
+    k_lambda = 111412.84 * np.cos(latitude) - 93.5 * np.cos(3 * latitude) - 0.118 * np.cos(5 * latitude)
+    return float(k_phi), float(k_lambda)
+
+
+def geodetic_to_enu_linear(latitude: ArrayLike, longitude: ArrayLike, origin: tuple[float, float]) -> Array:
+    """East and north (metres) by F (2.2)-(2.3), linear in the coordinates.
+
+    The print multiplies the row ``(k_phi k_lambda)`` with the column of differences and so adds metres east
+    to metres north; what is meant is one factor per axis, east from longitude and north from latitude. The
+    last term of ``k_lambda`` is printed with a minus; the usual series has a plus there, a difference of
+    0.24 m per degree at most.
+
+    Parameters
+    ----------
+    latitude, longitude
+        Radians, (N,).
+    origin
+        Latitude and longitude of the origin, radians.
+
+    Returns
+    -------
+    (N, 2): east, north, metres.
+    """
+    k_phi, k_lambda = metres_per_degree(origin[0])
+    east = k_lambda * np.degrees(np.asarray(longitude, float) - origin[1])
+    north = k_phi * np.degrees(np.asarray(latitude, float) - origin[0])
+    return np.stack([east, north], axis=-1)
+
+
+def linear_enu_error(latitude: ArrayLike, longitude: ArrayLike, origin: tuple[float, float]) -> Array:
+    """Horizontal distance between F's linear conversion and the exact one at zero height.
+
+    Parameters
+    ----------
+    latitude, longitude
+        Radians, (N,).
+    origin
+        Latitude and longitude of the origin, radians.
+
+    Returns
+    -------
+    (N,) metres.
+    """
+    exact_origin: Origin = (*origin, 0.0)
+    exact = ned_to_enu(geodetic_to_ned(latitude, longitude, np.zeros(np.shape(latitude)), exact_origin))
+    linear = geodetic_to_enu_linear(latitude, longitude, origin)
+    return np.asarray(np.linalg.norm(exact[..., :2] - linear, axis=-1))
+
+
+def camera_rotation(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> Array:
+    """``R_nc`` from the Euler angles of F's camera (F 2.9-2.10), which looks along its own x axis.
+
+    Parameters
+    ----------
+    roll, pitch, yaw
+        Radians, (N,) or scalars.
+
+    Returns
+    -------
+    (N, 3, 3), or (3, 3) where all three are scalars; takes a vector from c to n.
+    """
+    return np.asarray(euler_to_matrix(roll, pitch, yaw) @ R_CAMERA.T)

@@ -199,7 +199,7 @@ def calibrate_camera(
 
     Examples
     --------
-    >>> from wildlab.geometry import euler_to_matrix
+    >>> from wildlab.geometry.frames import euler_to_matrix
     >>> board = np.array([[x, y, 0.0] for y in range(5) for x in range(7)])
     >>> tilts = np.radians([[0, 20, 0], [20, 0, 30], [-25, 10, 0], [0, -25, 60], [15, 15, 10]])
     >>> views = Views(euler_to_matrix(*tilts.T), np.tile([-3.0, -2.0, 14.0], (5, 1)))

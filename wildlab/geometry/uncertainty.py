@@ -32,8 +32,15 @@ from wildlab.geometry.camera import normalise, normalise_jacobian
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.covariances import chi2_quantile
 from wildlab.geometry.frames import Array, rotation_vector_to_matrix, skew
-from wildlab.geometry.georeference import georeference_pixels, intersect_plane, matching
-from wildlab.geometry.terrain import Met, Terrain, intersect_terrain, pixels_to_terrain
+from wildlab.geometry.georeference import (
+    Met,
+    Terrain,
+    georeference_pixels,
+    intersect_plane,
+    intersect_terrain,
+    matching,
+    pixels_to_terrain,
+)
 
 #: Ratio of the second-order to the first-order term above which the linear ellipse is not trusted.
 FLAT = 0.1
@@ -154,7 +161,7 @@ def terrain_jacobians(
     100 m above level ground, looking straight down: a pixel is a tenth of a metre.
 
     >>> from wildlab.geometry.camera import Camera
-    >>> from wildlab.geometry.mount import Mount
+    >>> from wildlab.geometry.camera_poses import Mount
     >>> camera = Camera(640, 512, 1000.0, 1000.0, 320.0, 256.0)
     >>> poses = CameraPoses(camera, Mount("down"), np.array([0.0, 0.0, -100.0]), np.eye(3))
     >>> J = terrain_jacobians(poses, [[320.0, 256.0]], [[0.0, 0.0, 0.0]], [[0.0, 0.0]])

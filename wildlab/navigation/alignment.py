@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError
-from wildlab.geometry.frames import Array, matrix_to_quaternion
-from wildlab.geometry.gravity import flat_earth
+from wildlab.geometry.frames import Array, flat_earth, matrix_to_quaternion
 from wildlab.navigation.mekf import InitialState
 from wildlab.navigation.strapdown import ImuSamples, checked_imu, integrate_strapdown
 

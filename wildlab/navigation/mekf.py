@@ -26,14 +26,12 @@ from scipy.linalg import block_diag
 from wildlab.errors import WildlabError
 from wildlab.geometry.compilation import announced
 from wildlab.geometry.covariances import check_covariance, gate_threshold
-from wildlab.geometry.frames import Array, quaternion_to_matrix
-from wildlab.geometry.gravity import Earth
+from wildlab.geometry.frames import Array, Earth, quaternion_to_matrix
 from wildlab.navigation import kernels
 from wildlab.navigation.aiding import Aiding, gather, set_out
 from wildlab.navigation.kernels import Integers
-from wildlab.navigation.noise import AxisErrors
-from wildlab.navigation.noise import ImuNoise as ImuNoise
-from wildlab.navigation.strapdown import Gap, ImuSamples, Measurements, Timeline, checked_imu
+from wildlab.navigation.strapdown import AxisErrors, Gap, ImuSamples, Measurements, Timeline, checked_imu
+from wildlab.navigation.strapdown import ImuNoise as ImuNoise
 
 #: Verdicts on a measurement: left out by its gate; used; used after the covariance was widened.
 REJECTED, ACCEPTED, FORCED = kernels.REJECTED, kernels.ACCEPTED, kernels.FORCED
@@ -254,8 +252,11 @@ def run_mekf(
     Two seconds at rest, with a fix every half a second:
 
     >>> import numpy as np
-    >>> from wildlab.geometry.gravity import flat_earth
-    >>> from wildlab.navigation import STIM300, ImuSamples, InitialState, positions, run_mekf
+    >>> from wildlab.geometry.frames import flat_earth
+    >>> from wildlab.navigation.aiding import positions
+    >>> from wildlab.navigation.mekf import InitialState, run_mekf
+    >>> from wildlab.navigation.strapdown import STIM300
+    >>> from wildlab.navigation.strapdown import ImuSamples
     >>> t = np.arange(0, 2.01, 0.01)
     >>> earth = flat_earth()
     >>> imu = ImuSamples(t, np.tile([0, 0, -earth.gravity], (len(t), 1)), np.zeros((len(t), 3)))

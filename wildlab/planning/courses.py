@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array, wrap
-from wildlab.geometry.terrain import Terrain
+from wildlab.geometry.georeference import Terrain
 from wildlab.planning.patterns import Pattern
 
 #: Kinds of Dubins' ways: a turn, a straight line or a third turn, a turn. 1 is to the right, -1 to the left.

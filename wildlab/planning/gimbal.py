@@ -26,11 +26,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.camera_poses import R_MC_FORWARD, CameraPoses
 from wildlab.geometry.frames import Array, Mask, euler_to_matrix, matrix_to_rotation_vector
-from wildlab.geometry.georeference import pixel_rays
-from wildlab.geometry.mount import R_MC_FORWARD
-from wildlab.geometry.terrain import Terrain, intersect_terrain
+from wildlab.geometry.georeference import Terrain, intersect_terrain, pixel_rays
 from wildlab.planning.patterns import contains
 
 #: Straight down.

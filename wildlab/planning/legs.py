@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from wildlab.geometry.camera_poses import R_MC_DOWN
 from wildlab.geometry.frames import Array, Mask, euler_to_matrix
-from wildlab.geometry.mount import R_MC_DOWN
-from wildlab.geometry.terrain import Terrain
+from wildlab.geometry.georeference import Terrain
 from wildlab.planning.patterns import contains
 
 #: A turn of the camera that is too small to blur an image, rad.

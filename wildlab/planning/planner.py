@@ -18,14 +18,15 @@ done, and both rules by which an animal that was known is lost.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError
+from wildlab.geometry.compilation import compiled
 from wildlab.geometry.frames import Array, Indices, Mask
-from wildlab.geometry.terrain import Terrain
+from wildlab.geometry.georeference import Terrain
 from wildlab.geometry.viewsheds import lines_clear
 from wildlab.planning.legs import (
     Flying,
@@ -38,6 +39,195 @@ from wildlab.planning.legs import (
     sideways_limit,
     turn_between,
 )
+
+
+@compiled
+def inverse_trace(a: float, b: float, c: float, d: float, e: float, f: float) -> float:
+    """tr(Y^-1) of [[a, b, c], [b, d, e], [c, e, f]]; infinite where it is not positive definite."""
+    if not a > 0:
+        return np.inf
+    l2, l3 = b / a, c / a
+    d2 = d - b * l2
+    if not d2 > 0:
+        return np.inf
+    rest = e - c * l2
+    m = rest / d2
+    d3 = f - c * l3 - m * rest
+    if not d3 > 0:
+        return np.inf
+    return 1 / a + (l2 * l2 + 1) / d2 + ((l2 * m - l3) ** 2 + m * m + 1) / d3
+
+
+@compiled
+def inverse_traces(Y: Any) -> Any:
+    """tr(Y^-1) of each matrix (N, 3, 3), (N,). By pivots rather than by the determinant: where one direction
+    is known ten million times better than another, that loses all digits."""
+    out = np.empty(len(Y))
+    for i in range(len(Y)):
+        y = Y[i]
+        out[i] = inverse_trace(y[0, 0], y[0, 1], y[0, 2], y[1, 1], y[1, 2], y[2, 2])
+    return out
+
+
+@compiled
+def add_image(
+    points: Any, near: Any, cam: Any, R: Any, clear: Any, half: Any, sd: float, reach: float,
+    nearest: float, into: Any, seen: Any,
+) -> None:  # fmt: skip
+    """Add to ``into`` (N, 6) what an image tells of the points ``near``, and mark those that it shows.
+
+    ``near`` counts points, ``cam`` (3,), ``R`` (3, 3), ``clear`` (N,) or (0,) where nothing hides anything,
+    ``seen`` (N,) bool.
+    """
+    px, py, pz = cam[0], cam[1], cam[2]
+    r00, r10, r20 = R[0, 0], R[1, 0], R[2, 0]
+    r01, r11, r21 = R[0, 1], R[1, 1], R[2, 1]
+    r02, r12, r22 = R[0, 2], R[1, 2], R[2, 2]
+    all_clear = len(clear) == 0
+    for i in near:
+        x, y, z = points[i, 0] - px, points[i, 1] - py, points[i, 2] - pz
+        depth = r02 * x + r12 * y + r22 * z
+        if not depth > 0 or abs(r00 * x + r10 * y + r20 * z) > half[0] * depth:
+            continue
+        if abs(r01 * x + r11 * y + r21 * z) > half[1] * depth or not (all_clear or clear[i]):
+            continue
+        seen[i] = True
+        rho2 = x * x + y * y
+        rho = np.sqrt(rho2)
+        r2 = rho2 + z * z
+        told = np.exp(-r2 / (reach * reach)) / (sd * sd)
+        cos, sin = (x / rho, y / rho) if rho > 0 else (1.0, 0.0)
+        turn = told / max(rho, nearest) ** 2
+        u, v, w = cos * z / r2, sin * z / r2, -rho / r2
+        into[i, 0] += sin * sin * turn + told * u * u
+        into[i, 1] += -sin * cos * turn + told * u * v
+        into[i, 2] += told * u * w
+        into[i, 3] += cos * cos * turn + told * v * v
+        into[i, 4] += told * v * w
+        into[i, 5] += told * w * w
+
+
+@compiled
+def close_points(points: Any, weights: Any, cam: Any, limit: float) -> Any:
+    """Which points count and lie within ``limit`` of a camera, seen from above."""
+    near = np.empty(len(points), np.int64)
+    count = 0
+    for i in range(len(points)):
+        x, y = points[i, 0] - cam[0], points[i, 1] - cam[1]
+        if weights[i] > 0 and not x * x + y * y > limit * limit:
+            near[count] = i
+            count += 1
+    return near[:count]
+
+
+@compiled
+def gains_of_steps(
+    Y: Any, left: Any, weights: Any, points: Any, parents: Any, cams: Any, R: Any,
+    counts: Any, limits: Any, half: Any, sd: float, reach: float, nearest: float,
+) -> Any:  # fmt: skip
+    """By how much candidate steps would lower what is left to know, (K, G) m^2.
+
+    ``Y`` (B, N, 3, 3) and ``left`` (B, N) are those of the states that steps begin in, ``parents`` (K,) says
+    which. ``cams`` (K, L, 3) are the images' positions of a step, ``R`` (K, G, 3, 3) and ``counts``
+    (K, G, L) the attitudes to choose from; no image of a step shows a point further than ``limits`` (K,) from
+    where the step ends, seen from above. Nothing hides anything.
+    """
+    out = np.zeros((len(parents), R.shape[1]))
+    into = np.zeros((len(points), 6))
+    seen = np.zeros(len(points), np.bool_)
+    free = np.ones(0, np.bool_)
+    for k in range(len(parents)):
+        one = parents[k]
+        near = close_points(points, weights, cams[k, cams.shape[1] - 1], limits[k])
+        for g in range(R.shape[1]):
+            for image in range(cams.shape[1]):
+                if counts[k, g, image]:
+                    add_image(
+                        points, near, cams[k, image], R[k, g], free, half, sd, reach, nearest, into, seen
+                    )
+            for i in near:
+                if not seen[i]:
+                    continue
+                after = inverse_trace(
+                    Y[one, i, 0, 0] + into[i, 0], Y[one, i, 0, 1] + into[i, 1], Y[one, i, 0, 2] + into[i, 2],
+                    Y[one, i, 1, 1] + into[i, 3], Y[one, i, 1, 2] + into[i, 4], Y[one, i, 2, 2] + into[i, 5],
+                )  # fmt: skip
+                out[k, g] += weights[i] * (left[one, i] - after)
+                seen[i] = False
+                into[i] = 0.0
+    return out
+
+
+@compiled
+def after_images(
+    Y: Any, left: Any, weights: Any, points: Any, cams: Any, R: Any, counts: Any, clear: Any,
+    half: Any, sd: float, reach: float, nearest: float,
+) -> Any:  # fmt: skip
+    """Add what images tell of points that count to ``Y`` (N, 3, 3) and ``left`` (N,), in place.
+
+    ``cams`` (L, 3), ``R`` (L, 3, 3), or (1, 3, 3) for all, ``counts`` (L,), ``clear`` (L, N) or (0, 0). Gives
+    (N,) bool, which points the images show.
+    """
+    into = np.zeros((len(points), 6))
+    seen = np.zeros(len(points), np.bool_)
+    free = np.ones(0, np.bool_)
+    near = close_points(points, weights, cams[0], np.inf)
+    for image in range(len(cams)):
+        if counts[image]:
+            lines = clear[image] if len(clear) else free
+            add_image(
+                points, near, cams[image], R[min(image, len(R) - 1)], lines, half, sd, reach, nearest, into,
+                seen,
+            )  # fmt: skip
+    for i in range(len(points)):
+        if seen[i]:
+            y = Y[i]
+            y[0, 0] += into[i, 0]
+            y[1, 1] += into[i, 3]
+            y[2, 2] += into[i, 5]
+            y[0, 1] += into[i, 1]
+            y[0, 2] += into[i, 2]
+            y[1, 2] += into[i, 4]
+            y[1, 0], y[2, 0], y[2, 1] = y[0, 1], y[0, 2], y[1, 2]
+            left[i] = inverse_trace(y[0, 0], y[0, 1], y[0, 2], y[1, 1], y[1, 2], y[2, 2])
+    return seen
+
+
+@compiled
+def worth_beyond(left: Any, middles: Any, parents: Any, ends: Any, length: float) -> Any:
+    """What is left to know in blocks, counted less the further they are from where a step ends, (K,) m^2.
+
+    ``left`` (B, S) of each state's blocks, ``middles`` (S, 2), ``ends`` (K, 2) or more columns, ``length``
+    the distance at which a block counts 1/e.
+    """
+    out = np.zeros(len(parents))
+    for k in range(len(parents)):
+        for i in range(len(middles)):
+            if left[parents[k], i] > 0:
+                away = np.hypot(middles[i, 0] - ends[k, 0], middles[i, 1] - ends[k, 1])
+                out[k] += left[parents[k], i] * np.exp(-away / length)
+    return out
+
+
+@compiled
+def grow_old_all(Y: Any, left: Any, q: float) -> None:
+    """F (5.5) in place, for a walk with the variance ``q`` both ways; and nothing for its height.
+
+    With A the 2 x 2 block of Y for the ground and n the column beside it, A becomes (I + qA)^-1 A and n
+    (I + qA)^-1 n, written out so that nothing is subtracted from what is nearly the same.
+    """
+    for i in range(len(Y)):
+        y = Y[i]
+        a, b, d, n0, n1 = y[0, 0], y[0, 1], y[1, 1], y[0, 2], y[1, 2]
+        det = (1 + q * a) * (1 + q * d) - q * q * b * b
+        both = q * (a * d - b * b)
+        m0 = ((1 + q * d) * n0 - q * b * n1) / det
+        m1 = ((1 + q * a) * n1 - q * b * n0) / det
+        y[0, 0], y[0, 1], y[1, 1] = (a + both) / det, b / det, (d + both) / det
+        y[2, 2] -= q * (n0 * m0 + n1 * m1)
+        y[0, 2], y[1, 2] = m0, m1
+        y[1, 0], y[2, 0], y[2, 1] = y[0, 1], m0, m1
+        left[i] = inverse_trace(y[0, 0], y[0, 1], m0, y[1, 1], m1, y[2, 2])
 
 
 def in_field_of_view(points: ArrayLike, p_nc: ArrayLike, R_nc: ArrayLike, sensor: SearchSensor) -> Mask:
@@ -196,8 +386,6 @@ class InformationPlanner:
         flying: Flying,
         horizon: Horizon,
     ) -> None:
-        from wildlab.planning.kernels import inverse_traces
-
         self.points = np.ascontiguousarray(points, float)
         self.Y = np.array(Y, float)
         self.left = inverse_traces(self.Y)
@@ -223,8 +411,6 @@ class InformationPlanner:
         clear
             (L, N) whether nothing hides each point; None asks the terrain, whatever candidates do.
         """
-        from wildlab.planning.kernels import after_images
-
         if clear is None:
             clear = self._lines(leg.p_nc[None], self._reach(leg.p_nc[None], leg.R_nc[None]))[0]
         s = self.sensor
@@ -235,8 +421,6 @@ class InformationPlanner:
 
     def wait(self, q: float) -> None:
         """Let what is known wear off, F (5.5), by a walk of the variance ``q`` (m^2) each way."""
-        from wildlab.planning.kernels import grow_old_all
-
         grow_old_all(self.Y, self.left, float(q))
 
     def choose(self, platform: Platform) -> Chosen:
@@ -256,8 +440,6 @@ class InformationPlanner:
         WildlabError
             Where every candidate leaves the map.
         """
-        from wildlab.planning.kernels import after_images, gains_of_steps, worth_beyond
-
         h, s = self.horizon, self.sensor
         states = [platform]
         Y, left = self.Y[None], self.left[None]

@@ -23,7 +23,7 @@ from wildlab.evaluation.consistency import position_nees
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.terrain import Terrain
+from wildlab.geometry.georeference import Terrain
 from wildlab.replay.images import spread_evenly
 
 #: Letters of a name that are shown, at most.

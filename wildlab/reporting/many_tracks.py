@@ -22,7 +22,7 @@ from wildlab.names import listed
 from wildlab.reporting.charts import tracks as charts
 from wildlab.reporting.report import Report, Wording
 from wildlab.reporting.tracking import count_assumed, parameters_table, plain
-from wildlab.tracking.many.tracks import Count, count_interval, count_probabilities
+from wildlab.tracking.multitarget_tracks import Count, count_interval, count_probabilities
 
 #: A target is tracked well where it has a track at this share of the scans at which it can be seen; below
 #: half it is lost.

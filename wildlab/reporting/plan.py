@@ -16,7 +16,7 @@ from wildlab.analysis.plan import Plan
 from wildlab.analysis.plan_coverage import Covered
 from wildlab.analysis.plan_result import count, head_count, hectares, minutes, origin_text, percent
 from wildlab.geometry.frames import Array
-from wildlab.geometry.terrain import Terrain
+from wildlab.geometry.georeference import Terrain
 from wildlab.messages.catalogue import Message, load_texts, words
 from wildlab.messages.quantities import NOTHING
 from wildlab.names import figure_name

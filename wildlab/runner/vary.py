@@ -32,8 +32,7 @@ from wildlab.runner.seeds import (
     sweep_seeds,
     trial_key,
 )
-from wildlab.simulation import load_twin
-from wildlab.simulation.parameters import groups_of
+from wildlab.simulation.parameters import groups_of, load_twin
 from wildlab.studies.page import decide_claims, record_spread
 from wildlab.studies.protocol import VARIED, Study, split_keys
 

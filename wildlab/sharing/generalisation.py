@@ -37,9 +37,8 @@ from wildlab.flight.manifest import (
 )
 from wildlab.flight.schema import COVARIANCE_COLUMNS, NAV, TABLES
 from wildlab.flight.store import PREFERRED, Flight
-from wildlab.geometry.frames import Array, ned_to_geodetic
-from wildlab.geometry.gravity import Earth, local_earth
-from wildlab.navigation.magnetometer import earth_field
+from wildlab.geometry.frames import Array, Earth, local_earth, ned_to_geodetic
+from wildlab.navigation.aiding import earth_field
 from wildlab.sharing.tiers import Cell, Treatment, cell_of
 
 #: Names that say what a thing is and nothing of where: wildlab's own, and those of kinds of sensors. Poses

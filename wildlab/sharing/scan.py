@@ -29,8 +29,7 @@ from wildlab.errors import WildlabError
 from wildlab.flight.manifest import Manifest, parse_settings
 from wildlab.flight.store import Flight
 from wildlab.flight.terrain import undulation
-from wildlab.geometry.frames import Array, ned_to_geodetic
-from wildlab.geometry.gravity import normal_gravity
+from wildlab.geometry.frames import Array, ned_to_geodetic, normal_gravity
 from wildlab.paths import ROOT
 from wildlab.sharing.allow_list import DATA_ADDRESS, FORMS, own_phrases, own_vocabulary
 from wildlab.sharing.generalisation import Generalised, first_stamp, names_in, new_origin

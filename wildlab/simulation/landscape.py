@@ -15,7 +15,7 @@ from scipy import fft, ndimage
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
-from wildlab.geometry.terrain import Terrain
+from wildlab.geometry.georeference import Terrain
 from wildlab.simulation.parameters import TwinParameters
 
 #: Between heights of a course that follows the ground, and how far beyond the flight they reach, s.

@@ -18,7 +18,7 @@ import numpy as np
 
 from wildlab.flight.files import Strict
 from wildlab.flight.manifest import Manifest, make_manifest
-from wildlab.geometry.mount import Mount, helgesen_misalignment
+from wildlab.geometry.camera_poses import Mount, helgesen_misalignment
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.landscape import land_record
 from wildlab.simulation.parameter_groups import Gnss, Imu, Parameter, TwinMount
@@ -185,7 +185,7 @@ def as_flown(twin: TwinParameters, seed: int) -> TwinParameters:
 
     Examples
     --------
-    >>> from wildlab.simulation import load_twin
+    >>> from wildlab.simulation.parameters import load_twin
     >>> stated = load_twin("static-antenna")
     >>> as_flown(stated, 1).camera.fx.number == stated.camera.fx.number
     False

@@ -16,8 +16,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from wildlab.geometry.frames import Array, euler_to_matrix
-from wildlab.geometry.gravity import USUAL_GRAVITY, Earth, flat_earth, local_earth
+from wildlab.geometry.frames import USUAL_GRAVITY, Array, Earth, euler_to_matrix, flat_earth, local_earth
 from wildlab.simulation import kernels
 from wildlab.simulation.error_models import gauss_markov, rounded, stream, with_attitude_error
 from wildlab.simulation.parameter_groups import Gimbal, Gnss, Imu, TargetGps

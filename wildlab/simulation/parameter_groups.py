@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, field_validator, model_validator
 
 from wildlab.flight.files import Strict
-from wildlab.geometry.gravity import STANDARD_GRAVITY
+from wildlab.geometry.frames import STANDARD_GRAVITY
 
 #: Units a twin may use, and what one of each is in SI and radians.
 UNITS = {
@@ -313,7 +313,7 @@ class TruePose(Strict):
 class Assumed(Strict):
     """Standard deviations that someone who only has the published facts would assume.
 
-    Tilt and heading: see `wildlab.geometry.attitude_uncertainty`.
+    Tilt and heading: see `wildlab.geometry.covariances`.
     """
 
     pixel: FocalLength

@@ -405,7 +405,7 @@ def groups_of(twin: TwinParameters) -> dict[str, tuple[str, ...]]:
 
     Examples
     --------
-    >>> from wildlab.simulation import load_twin
+    >>> from wildlab.simulation.parameters import load_twin
     >>> groups_of(load_twin("fast-vessel"))["flight: wind speed"]
     ('flight.wind_speed',)
     """

@@ -14,8 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wildlab.geometry.frames import Array, euler_to_matrix
-from wildlab.geometry.gravity import USUAL_GRAVITY
+from wildlab.geometry.frames import USUAL_GRAVITY, Array, euler_to_matrix
 from wildlab.simulation import kernels
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.parameters import TwinParameters

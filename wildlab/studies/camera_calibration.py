@@ -15,11 +15,10 @@ from wildlab.evaluation.intervals import Interval
 from wildlab.evaluation.replication import propagate_rounding
 from wildlab.geometry.calibration import Mounting, mounting_from_points
 from wildlab.geometry.camera import Camera, camera_from_data_sheet
-from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.camera_poses import CameraPoses, Mount, camera_rotation, helgesen_misalignment
 from wildlab.geometry.frames import Array, euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.intrinsics import PINHOLE, Views, calibrate_camera, parameters_of, project_board
-from wildlab.geometry.mount import Mount, camera_rotation, helgesen_misalignment
 from wildlab.reporting.charts.drawing import Values, draw_dots, finish, rows_chart
 from wildlab.reporting.figures import BLUE, GREEN, INK, VERMILLION, new_figure
 from wildlab.reporting.published import error_name

@@ -23,10 +23,9 @@ from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.evaluation.shares import FAILS, HOLDS, UNDECIDABLE
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import in_image
-from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.camera_poses import CameraPoses, Mount
 from wildlab.geometry.frames import Array, euler_to_matrix, matrix_to_euler, quaternion_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel, pixel_to_plane
-from wildlab.geometry.mount import Mount
 from wildlab.reporting.charts.drawing import Values, draw_dots, draw_lines, draw_way, finish
 from wildlab.reporting.figures import (
     BLUE,

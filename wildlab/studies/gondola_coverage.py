@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from wildlab.analysis.plan_coverage import ExecutionErrors, as_planned
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
-from wildlab.geometry.terrain import Terrain
+from wildlab.geometry.georeference import Terrain
 from wildlab.planning.courses import fly
 from wildlab.planning.coverage import Coverage, nodes_in
 from wildlab.planning.gimbal import (

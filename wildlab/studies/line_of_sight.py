@@ -20,11 +20,17 @@ from numpy.typing import ArrayLike, NDArray
 from wildlab.evaluation.intervals import mean_interval, mean_share_interval
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.flodell import camera_rotation
-from wildlab.geometry.frames import Array
-from wildlab.geometry.line_of_sight import Looked, cast_rays, compare_angles, field_of_view, in_field_of_view
-from wildlab.geometry.terrain import Terrain
-from wildlab.geometry.viewsheds import footprint, lines_clear
+from wildlab.geometry.frames import Array, camera_rotation
+from wildlab.geometry.georeference import Terrain
+from wildlab.geometry.viewsheds import (
+    Looked,
+    cast_rays,
+    compare_angles,
+    field_of_view,
+    footprint,
+    in_field_of_view,
+    lines_clear,
+)
 from wildlab.messages.quantities import percent, percent_between
 from wildlab.reporting.charts.drawing import Values, draw_heights, finish, fit_map, lines_chart
 from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, VERMILLION, map_axes, new_figure

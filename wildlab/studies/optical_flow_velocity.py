@@ -23,11 +23,9 @@ from wildlab.errors import WildlabError
 from wildlab.flight.clocks import between, frame_times
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.flow import camera_flow, flow_between, motion_between
-from wildlab.geometry.flow_uncertainty import FlowErrors, mean_velocity
+from wildlab.geometry.camera_poses import CameraPoses, Mount
+from wildlab.geometry.flow import FlowErrors, camera_flow, flow_between, mean_velocity, motion_between
 from wildlab.geometry.frames import Array
-from wildlab.geometry.mount import Mount
 from wildlab.reporting.charts.drawing import (
     draw_dots,
     draw_line,

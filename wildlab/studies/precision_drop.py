@@ -21,9 +21,9 @@ from wildlab.detection.colour import Colour, coloured, find_coloured
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
+from wildlab.geometry.camera_poses import R_MC_DOWN
 from wildlab.geometry.frames import Array, euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
-from wildlab.geometry.mount import R_MC_DOWN
 from wildlab.reporting.charts.drawing import Values, draw_picture, lines_chart
 from wildlab.reporting.figures import GREY, INK, ORANGE, new_figure
 from wildlab.reporting.published import bounds_of, spread_key

@@ -18,10 +18,11 @@ from wildlab.analysis.georeference import observe, truth_of
 from wildlab.evaluation.consistency import position_nees
 from wildlab.flight.clocks import frame_times, gimbal_angles, poses_at, truth_at
 from wildlab.flight.store import Flight
-from wildlab.geometry import CameraPoses, in_image, widest_view
+from wildlab.geometry.camera import in_image
+from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
-from wildlab.geometry.georeference import georeference_pixels, ground_to_pixel
-from wildlab.geometry.terrain import pixels_to_terrain
+from wildlab.geometry.georeference import georeference_pixels, ground_to_pixel, pixels_to_terrain
+from wildlab.geometry.viewsheds import widest_view
 from wildlab.replay.scene import Estimates, Points, ReplayScene
 from wildlab.reporting.charts.drawing import draw_heights
 from wildlab.reporting.figures import (

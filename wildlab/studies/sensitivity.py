@@ -10,10 +10,9 @@ from numpy.typing import ArrayLike
 
 from wildlab.evaluation.replication import propagate_rounding
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.flodell import linear_enu_error
-from wildlab.geometry.frames import Array, euler_to_matrix
+from wildlab.geometry.camera_poses import Mount, camera_pose, helgesen_misalignment
+from wildlab.geometry.frames import Array, euler_to_matrix, linear_enu_error
 from wildlab.geometry.georeference import pixel_to_plane
-from wildlab.geometry.mount import Mount, camera_pose, helgesen_misalignment
 from wildlab.reporting.charts.drawing import fields_chart
 from wildlab.reporting.figures import BLUE, GREEN, INK, VERMILLION, end_label, new_figure
 

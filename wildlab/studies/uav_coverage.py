@@ -23,7 +23,7 @@ from wildlab.evaluation.intervals import mean_share_interval
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
-from wildlab.geometry.terrain import Terrain
+from wildlab.geometry.georeference import Terrain
 from wildlab.messages.quantities import percent_between
 from wildlab.planning.courses import Course, fly, follow_terrain
 from wildlab.planning.coverage import Coverage, first_seen, nodes_in, see, walks

@@ -40,7 +40,7 @@ from wildlab.analysis.plan_coverage import ExecutionErrors, with_errors
 from wildlab.evaluation.intervals import mean_interval, mean_share_interval, share_interval
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
-from wildlab.geometry.terrain import Terrain
+from wildlab.geometry.georeference import Terrain
 from wildlab.messages.quantities import percent_between
 from wildlab.planning.courses import fly, follow_terrain
 from wildlab.planning.coverage import walks

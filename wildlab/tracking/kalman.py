@@ -144,7 +144,7 @@ def fade(dt: float, correlation_time: float) -> float:
 
 
 @compiled
-def _root(covariance: Array) -> tuple[Array, Array]:
+def root_of_covariance(covariance: Array) -> tuple[Array, Array]:
     """``A`` (k, r) with ``A A'`` the covariance, and its left inverse; directions without variance left out.
 
     By way of correlations, so that metres and radians weigh alike.
@@ -209,8 +209,8 @@ def limit_cross(C: Array, P: Array, P_pose: Array) -> tuple[Array, bool]:
     """
     if not np.any(C):
         return C, False
-    root, inverse = _root(P)
-    root_pose, inverse_pose = _root(P_pose)
+    root, inverse = root_of_covariance(P)
+    root_pose, inverse_pose = root_of_covariance(P_pose)
     if root.shape[1] == 0 or root_pose.shape[1] == 0:
         return np.zeros_like(C), True
     u, correlations, w = np.linalg.svd(inverse @ C @ np.ascontiguousarray(inverse_pose.T), False)

@@ -3,11 +3,30 @@
 The same few arguments for every filter: times, measurements, their covariances, a `Sensor` that knows the
 poses, a motion model, a `Start`, the errors to consider. Nothing is kept between calls. The filter steps to
 every row, also to rows without a usable measurement; see `wildlab.tracking.motion` for where that matters.
+
+Back over a track: estimates that know later measurements too, for flights that are over.
+
+Each estimate is corrected by what the smoother changed at the next row, as by Rauch, Tung and Striebel,
+
+``x^s_k = x_k + G (x^s_k+1 - x_k+1|k)``,
+
+but with the ``G`` that is best for the joint covariance of target and considered errors, which are not
+estimated and last. With ``e`` for truth minus estimate and ``o`` for the errors,
+``e^s_k+1 = A e_k+1|k + B o_k+1 + n``, where ``n`` has the covariance ``N`` and is independent of what was
+before: so the correction ``d = (I - A) e - B o - n`` has a known covariance with ``e_k``, ``G`` is that
+over the covariance of ``d``, and ``A``, ``B`` and ``N`` follow one row back. The smoothed covariance is
+never above the filter's, and without considered errors it is Rauch, Tung and Striebel's.
+
+What a measurement did is known by the moments before and after it. The best gain leaves the error after a
+measurement uncorrelated with the innovation, so with the error before it has its own covariance in common; no
+more than there was, where mixtures grow.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import reduce
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -19,10 +38,12 @@ from wildlab.geometry.frames import Array
 from wildlab.tracking.association import nearest_detection
 from wildlab.tracking.kalman import (
     Considered,
+    Errors,
     correct,
     errors_of,
     limit_cross,
     predict,
+    root_of_covariance,
     spread_of_prediction,
     update_schmidt,
 )
@@ -142,6 +163,8 @@ class Track(NamedTuple):
         (N,) index of the detection that was nearest, -1 where there was none to choose from.
     limited
         (N,) bool: the Schmidt filter's cross-covariance had to be shortened here (`kalman.limit_cross`).
+    C
+        (N, n, k) after each row, with the k errors that `run_filter` considered.
     """
 
     times: Array
@@ -153,6 +176,7 @@ class Track(NamedTuple):
     used: NDArray[np.bool_]
     chosen: NDArray[np.int64]
     limited: NDArray[np.bool_]
+    C: Array = np.empty((0, 0, 0))
 
 
 class FilterInputs(NamedTuple):
@@ -368,25 +392,6 @@ def _check_order(times: Array, field: str) -> None:
 Ends = Callable[[int, int, Array, Array], bool]
 
 
-class Step(NamedTuple):
-    """What a filter did at one row; ``gain`` and what belongs to it are None where nothing was used."""
-
-    row: int
-    time: float
-    F: Array  # (n, n) from the row before, or from the start
-    Q: Array
-    x_prior: Array  # (n,)
-    P_prior: Array
-    C_prior: Array  # (n, k)
-    x: Array
-    P: Array
-    C: Array
-    gain: Array | None = None  # (n, m)
-    H: Array | None = None  # (m, n)
-    H_errors: Array | None = None  # (m, k)
-    R: Array | None = None  # (m, m)
-
-
 def run_filter(
     times: ArrayLike,
     measurements: ArrayLike,
@@ -399,7 +404,6 @@ def run_filter(
     gate_probability: float = 1.0,
     output_times: ArrayLike | None = None,
     ends: Ends | None = None,
-    steps: list[Step] | None = None,
 ) -> Track:
     """Kalman filter on positions; extended filter on pixels, bearings, ranges; Schmidt filter with ``pose``.
 
@@ -432,8 +436,6 @@ def run_filter(
     ends
         When the track ends: asked at every row behind the start, see `Ends`. From there on there are no
         estimates. None: never.
-    steps
-        Is filled with what was done at every row, for a smoother.
 
     Returns
     -------
@@ -453,7 +455,9 @@ def run_filter(
     A target at rest at 10 m north, seen three times with a standard deviation of 1 m:
 
     >>> import numpy as np
-    >>> from wildlab.tracking import Start, positions, rest, run_filter
+    >>> from wildlab.tracking.motion import rest
+    >>> from wildlab.tracking.run import Start, run_filter
+    >>> from wildlab.tracking.sensors import positions
     >>> z = [[10.0, 0.0], [10.5, 0.5], [9.5, -0.5]]
     >>> start = Start(time=0.0, x=np.array([0.0, 0.0]), P=100.0 * np.eye(2))
     >>> track = run_filter([0.0, 1.0, 2.0], z, np.eye(2), positions(), rest, start)
@@ -463,18 +467,14 @@ def run_filter(
     given = checked(times, measurements, R, gate_probability, output_times, sensor.sizes)
     check_sensor(sensor, start, len(given.times))
     errors = errors_of(pose, sensor, len(given.times))
-    n, steps = len(start.x), [] if steps is None else steps
+    n, x_last = len(start.x), np.asarray(start.x, float)
     C = np.zeros((n, 0 if errors is None else len(errors.times)))
-
-    x_last, P_first = np.asarray(start.x, float), np.asarray(start.P, float)
+    crosses = np.zeros((len(given.times), *C.shape))
     # The row that a start was made from, or the first that is not before it.
     last = (
         start.row
         if start.row >= 0
         else min(int(np.searchsorted(given.times, start.time)), len(given.times) - 1)
-    )
-    steps.append(
-        Step(last, float(start.time), np.eye(n), np.zeros((n, n)), x_last, P_first, C, x_last, P_first, C)
     )
 
     def step(row: int, state: State, track: Track) -> State | None:
@@ -485,16 +485,14 @@ def run_filter(
         x, P = predict(x, P, F, Q)
         if ends is not None and ends(row, last, x_last, P):
             return None
-        C = C if errors is None else errors.carry(C, F, row, dt)
-        done = Step(row, now, F, Q, x, P, C, x, P, C)
-        steps.append(done)
+        if errors is not None:
+            C = crosses[row] = errors.carry(C, F, row, dt)
         if not np.isfinite(given.z[row]).all(axis=-1).any():
             return now, x, P
         expected = sensor.predict(row, x[: sensor.states])
         H = on_state(expected.H_position, n)
         if not (np.isfinite(expected.z).all() and np.isfinite(H).all()):
             return now, x, P
-        H_errors = np.zeros((len(H), 0))
         if errors is None:
             spread = H @ P @ H.T
         else:
@@ -502,7 +500,6 @@ def run_filter(
             if not (np.isfinite(P_pose).all() and np.isfinite(H_errors).all()):
                 return now, x, P
             C, track.limited[row] = limit_cross(C.copy(), P.copy(), P_pose.copy())
-            steps[-1] = done = done._replace(C_prior=C, C=C)
             spread = spread_of_prediction(P, C, P_pose, H, H_errors)
         with np.errstate(invalid="ignore"):
             angles = angles_at(sensor, row)
@@ -515,13 +512,149 @@ def run_filter(
             return now, x, P
         noise = given.R[row, best.detection]
         if errors is None:
-            update = correct(x, P, best.innovation, H, noise)
-            x, P, gain = update.x, update.P, update.gain
+            done = correct(x, P, best.innovation, H, noise)
         else:
-            considered = update_schmidt(x, P, C, P_pose, best.innovation, H, H_errors, noise)
-            x, P, C, gain = considered.x, considered.P, considered.C, considered.gain
-        last, x_last = row, x
-        steps[-1] = done._replace(x=x, P=P, C=C, gain=gain, H=H, H_errors=H_errors, R=noise)
-        return now, x, P
+            done = update_schmidt(x, P, C, P_pose, best.innovation, H, H_errors, noise)
+            C = crosses[row] = done.C
+        last, x_last = row, done.x
+        return now, done.x, done.P
 
-    return step_through(given, start, motion, step)
+    return step_through(given, start, motion, step)._replace(C=crosses)
+
+
+#: Variances below this share of those that there were count as zero: rounding.
+NEGLIGIBLE = 1e-10
+
+
+def smooth(track: Track, motion: Motion, errors: Errors | None = None) -> Track:
+    """Go back over the track of a filter: `run_filter` or `run_unscented`.
+
+    Parameters
+    ----------
+    track
+        Its estimates at the times of all measurements, as they are where no ``output_times`` were asked for.
+    motion
+        The one that the filter had.
+    errors
+        Those that it considered (`wildlab.tracking.kalman.errors_of`); left out: none.
+
+    Returns
+    -------
+    Track
+        The same with smoothed ``x`` and ``P``; NaN before the start.
+
+    Raises
+    ------
+    WildlabError
+        For a track whose times are not those of its measurements.
+
+    Examples
+    --------
+    A target at rest: all that is known at the end was true at the beginning.
+
+    >>> import numpy as np
+    >>> from wildlab.tracking.motion import rest
+    >>> from wildlab.tracking.run import Start, run_filter
+    >>> from wildlab.tracking.sensors import positions
+    >>> start = Start(time=0.0, x=np.zeros(2), P=100.0 * np.eye(2))
+    >>> track = run_filter([0.0, 1.0], [[1.0, 0.0], [3.0, 0.0]], np.eye(2), positions(), rest, start)
+    >>> smooth(track, rest).x[:, 0].round(2).tolist()
+    [1.99, 1.99]
+    """
+    if len(track.times) != len(track.nis):
+        raise WildlabError(
+            f"estimates at {len(track.times)} times of {len(track.nis)} measurements",
+            "give it at the measurements' times", field="track",
+        )  # fmt: skip
+    x, P = track.x.copy(), track.P.copy()
+    begun = np.flatnonzero(np.isfinite(x).all(axis=1))
+    times, instant = np.unique(track.times[begun], return_inverse=True)
+    # Of several rows at an instant the last has what all of them tell.
+    rows = begun[np.searchsorted(track.times[begun], times, side="right") - 1]
+    C, of_rows = np.zeros((len(rows), x.shape[1], 0)), lasting_errors((), len(rows))
+    if errors is not None:
+        phi = [reduce(np.matmul, errors.phi[a + 1 : b + 1][::-1]) for a, b in pairwise([-1, *rows])]
+        C, known = track.C[rows], known_before(errors.covariance)
+        of_rows = errors._replace(covariance=known[rows], phi=np.array(phi))
+    smoothed = smooth_moments(times, x[rows], P[rows], C, motion, of_rows)
+    x[begun], P[begun] = (part[instant] for part in smoothed)
+    return track._replace(x=x, P=P)
+
+
+def lasting_errors(correlation_times: Sequence[float], rows: int) -> Errors:
+    """Errors (k,) of variance one, for as long as they last, at so many rows."""
+    k = len(correlation_times)
+    unit = np.broadcast_to(np.eye(k), (rows, k, k))
+    return Errors(unit, unit, np.asarray(correlation_times, float), [])
+
+
+def smooth_moments(
+    times: Array, x: Array, P: Array, C: Array, motion: Motion, errors: Errors
+) -> tuple[Array, Array]:
+    """Back over the moments of one track.
+
+    Parameters
+    ----------
+    times
+        (N,) s, in order.
+    x, P, C
+        (N, n), (N, n, n) and (N, n, k) after each row's measurement.
+    motion
+        The one that the filter had.
+    errors
+        The k errors at each row.
+
+    Returns
+    -------
+    x, P
+        With all measurements.
+    """
+    after, spread = x.copy(), P.copy()
+    n, known = x.shape[1], errors.covariance
+    A, B, N = np.eye(n), np.zeros(C.shape[1:]), np.zeros((n, n))
+    for row in range(len(times) - 2, -1, -1):
+        dt = float(times[row + 1] - times[row])
+        F, Q = motion(dt)
+        psi = errors.transition(row + 1, dt)
+        ahead = _joint(F @ P[row] @ F.T + Q, F @ C[row] @ psi.T, known[row + 1])
+        sd = np.sqrt(np.maximum(np.diag(ahead), 0))
+        # What is left after the measurement of the errors before it.
+        root, inverse = root_of_covariance(ahead[:n, :n])
+        size, axes = np.linalg.eigh(inverse @ P[row + 1] @ inverse.T)
+        cross = np.hstack([(root @ axes * np.minimum(size, 1)) @ axes.T @ root.T, C[row + 1]])
+        kept = _over(cross, ahead, sd)
+        values, axes = np.linalg.eigh(P[row + 1] - kept @ cross.T)
+        N = N + A @ (axes * np.maximum(values, 0)) @ axes.T @ A.T
+        A, B = A @ kept[:, :n], A @ kept[:, n:] + B
+        D = np.hstack([np.eye(n) - A, -B])
+        G = _over(np.hstack([P[row] @ F.T, C[row] @ psi.T]) @ D.T, D @ ahead @ D.T + N, sd[:n])
+        after[row] = x[row] + G @ (after[row + 1] - F @ x[row])
+        grown = known[row + 1] - psi @ known[row] @ psi.T
+        by_noise, by_errors = G @ (A - np.eye(n)), G @ B
+        N = by_noise @ Q @ by_noise.T + by_errors @ grown @ by_errors.T + G @ N @ G.T
+        A, B = np.eye(n) + by_noise @ F, by_errors @ psi
+        both = np.hstack([A, B])
+        smoothed = both @ _joint(P[row], C[row], known[row]) @ both.T + N
+        spread[row] = (smoothed + smoothed.T) / 2
+    return after, spread
+
+
+def _joint(P: Array, C: Array, P_errors: Array) -> Array:
+    return np.block([[P, C], [C.T, P_errors]])
+
+
+def _over(cross: Array, covariance: Array, sd: Array) -> Array:
+    """``cross covariance^-1``; directions whose variances are nothing beside ``sd`` squared are left out."""
+    unit = np.divide(1, sd, out=np.zeros_like(sd), where=sd > 0)
+    values, vectors = np.linalg.eigh((covariance + covariance.T) / 2 * np.outer(unit, unit))
+    inverse = np.divide(1, values, out=np.zeros_like(values), where=values > NEGLIGIBLE)
+    return np.asarray(((cross * unit) @ vectors * inverse) @ vectors.T * unit, float)
+
+
+def known_before(covariance: Array) -> Array:
+    """(N, k, k) with the one before where there is none, and the first that is known before that."""
+    known = np.asarray(np.isfinite(covariance).all(axis=(1, 2)))
+    if not known.any():
+        return np.zeros_like(covariance)
+    last = np.maximum.accumulate(np.where(known, np.arange(len(known)), -1))
+    return covariance[np.where(last < 0, int(np.argmax(known)), last)]

@@ -14,12 +14,11 @@ from wildlab.analysis.tracks.ground_positions import PlacedScans, _of_ranges, pl
 from wildlab.analysis.tracks.scans import Scans, scans_of
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.camera_poses import CameraPoses, Mount
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import georeference_pixels
-from wildlab.geometry.mount import Mount
 from wildlab.simulation.twins import simulate_twin
-from wildlab.tracking.many import Scan
+from wildlab.tracking.target_model import Scan
 
 NOISE = "[sensors.radar.noise]\nrange_m = 2.0\nazimuth_deg = 1.5\n"
 

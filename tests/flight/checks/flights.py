@@ -15,11 +15,11 @@ from wildlab.flight.manifest import make_manifest
 from wildlab.flight.schema import FORCE, RATE
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array, matrix_to_quaternion
-from wildlab.simulation import (
+from wildlab.simulation.courses import loiter_path
+from wildlab.simulation.trajectory import (
     angular_rates,
     attitude_along,
     fixed_wing_trajectory,
-    loiter_path,
     specific_forces,
 )
 

@@ -12,9 +12,9 @@ from scipy.spatial.transform import Rotation
 
 from wildlab.flight.checks.known_points import SightingGeometry, Sightings, calibration_mistakes, judge
 from wildlab.geometry.camera import Camera
+from wildlab.geometry.camera_poses import Mount, camera_pose
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
-from wildlab.geometry.mount import Mount, camera_pose
 
 PLACE = (63.4, 10.4, 40.0)
 LENS = Camera(640, 512, 700.0, 700.0, 330.0, 250.0, distortion=(-0.1, 0.0, 0.0, 0.0, 0.0))

@@ -24,7 +24,7 @@ from wildlab.flight.checks.findings import Correction, change_columns, state
 from wildlab.flight.schema import FORCE, RATE
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import geodetic_to_ned, ned_to_geodetic
-from wildlab.simulation import fixed_wing_trajectory
+from wildlab.simulation.trajectory import fixed_wing_trajectory
 
 ORIGIN = (np.radians(63.4), np.radians(10.4), 40.0)
 #: Makes a mistake, in the flight or in the copy that it gives.

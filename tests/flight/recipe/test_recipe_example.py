@@ -18,8 +18,8 @@ from wildlab.flight.importing import import_flight
 from wildlab.flight.recipes import Recipe
 from wildlab.flight.schema import UNITS
 from wildlab.flight.store import load_flight
+from wildlab.geometry.camera_poses import camera_pose
 from wildlab.geometry.georeference import pixel_to_plane
-from wildlab.geometry.mount import camera_pose
 from wildlab.paths import DATA
 
 README = (DATA / "recipes" / "README.md").read_text(encoding="utf-8")

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from wildlab.geometry.camera import Camera
+from wildlab.geometry.camera_poses import R_MC_DOWN
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
-from wildlab.geometry.mount import R_MC_DOWN
 from wildlab.simulation.scene.coloured import ColourView, Ground, Tarpaulin, render_colour
 
 CAMERA = Camera(320, 180, 260.0, 260.0, 159.5, 89.5)

@@ -7,10 +7,9 @@ import pytest
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.camera_poses import R_MC_DOWN, CameraPoses, Mount
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
-from wildlab.geometry.mount import R_MC_DOWN, Mount
 from wildlab.simulation.landscape import TREES_M, UNEVEN, grow_trees, synthetic_landscape
 from wildlab.simulation.scene.drawn import animal, slab, tree
 from wildlab.simulation.scene.land import (

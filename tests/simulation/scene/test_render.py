@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from wildlab.geometry.camera import Camera, normalise
-from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.camera_poses import CameraPoses, Mount
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import georeference_pixels
-from wildlab.geometry.mount import Mount
 from wildlab.simulation.scene.bodies import Body, Layer, rectangle, vessel
 from wildlab.simulation.scene.render import EVEN, Scene, Sea, mean_square_slope, outline_of, render, tiles_of
 

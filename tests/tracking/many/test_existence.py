@@ -17,7 +17,7 @@ from wildlab.tracking.association import (
     association_probabilities,
     belief_propagation,
 )
-from wildlab.tracking.many.tracks import after_scan, still_there, visible_later, weights
+from wildlab.tracking.multitarget_tracks import after_scan, still_there, visible_later, weights
 
 shares = st.floats(0.01, 0.99)
 

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.tracking.many.test_run import BOTH, LONG, SHIP
-from wildlab.tracking.many.target_model import (
+from wildlab.tracking.multitarget_tracks import begin
+from wildlab.tracking.target_model import (
     STEERS_M_S,
     Gathered,
     gather,
@@ -18,7 +19,6 @@ from wildlab.tracking.many.target_model import (
     near_side,
     on_one_hull,
 )
-from wildlab.tracking.many.tracks import begin
 
 
 def turned(angle: float) -> np.ndarray:

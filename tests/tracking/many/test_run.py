@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wildlab.tracking.many.run import follow_many, run_many, step
-from wildlab.tracking.many.target_model import POINT, Hull, ManySensorModel, ManyTargetModel, Scan
-from wildlab.tracking.many.tracks import begin, moves
+from wildlab.tracking.multitarget import follow_many, run_many, step
+from wildlab.tracking.multitarget_tracks import begin, moves
+from wildlab.tracking.target_model import POINT, Hull, ManySensorModel, ManyTargetModel, Scan
 
 EYE = ManySensorModel("eye", 0.9, 1e-4, 0.0, 1e6, 3.0, (0.0,), (0.0,), (0.0,))
 POINTS = ManyTargetModel(

@@ -13,12 +13,11 @@ from tests.tracking.many.test_run import look
 from tests.tracking.many.test_update import OPEN, SURE
 from tests.tracking.poses import GENERATORS
 from wildlab.evaluation.consistency import chi_square_interval, nees
-from wildlab.tracking.many.run import Shown, run_many, smooth_considering, smooth_many
-from wildlab.tracking.many.target_model import Hull, own_columns, own_lasting
 from wildlab.tracking.motion import white_acceleration
-from wildlab.tracking.run import Start, Track, run_filter
+from wildlab.tracking.multitarget import Shown, run_many, smooth_many
+from wildlab.tracking.run import Start, Track, lasting_errors, run_filter, smooth, smooth_moments
 from wildlab.tracking.sensors import positions
-from wildlab.tracking.smoothing import smooth
+from wildlab.tracking.target_model import Hull, own_columns, own_lasting
 
 H = np.eye(2, 4)
 
@@ -103,8 +102,9 @@ def test_covariances_are_those_of_the_errors_of_smoothed_tracks(rng):
         P.append(e @ e.T)
         C.append(e @ o.T)
     x = np.array(filtered)
+    errors, motion = lasting_errors(lasting.tolist(), looks), partial(white_acceleration, density=0.3)
     after = [
-        smooth_considering(times.tolist(), x[..., source], np.array(P), np.array(C), 0.3, lasting.tolist())
+        smooth_moments(times, x[..., source], np.array(P), np.array(C), motion, errors)
         for source in range(unit.shape[1])
     ]
     off = np.array(truths) - np.stack([mean for mean, _ in after], axis=-1)

@@ -14,11 +14,11 @@ from tests.tracking.many.test_run import EYE, POINTS, lines, look, looks
 from tests.tracking.poses import GENERATORS
 from wildlab.tracking.association import association_probabilities
 from wildlab.tracking.kalman import update_schmidt
-from wildlab.tracking.many.run import follow_many, learnt_from_others, moved_together
-from wildlab.tracking.many.target_model import Scan
-from wildlab.tracking.many.tracks import Compared, compare, compare_bearings, update
 from wildlab.tracking.motion import white_acceleration
+from wildlab.tracking.multitarget import follow_many, learnt_from_others, moved_together
+from wildlab.tracking.multitarget_tracks import Compared, compare, compare_bearings, update
 from wildlab.tracking.sensors import left_out
+from wildlab.tracking.target_model import Scan
 
 H = np.eye(2, 4)
 

@@ -37,16 +37,15 @@ from wildlab.analysis.tracks.scans import PLACEABLE, PLACED, SLOTS, Scans, predi
 from wildlab.errors import WildlabError
 from wildlab.flight.manifest import SensorPart
 from wildlab.flight.store import Flight
-from wildlab.geometry.attitude_uncertainty import level_axes
 from wildlab.geometry.camera import in_image, project
+from wildlab.geometry.covariances import level_axes
 from wildlab.geometry.frames import Array
-from wildlab.geometry.terrain import pixels_to_terrain
+from wildlab.geometry.georeference import pixels_to_terrain
 from wildlab.geometry.uncertainty import GroundJacobians, PoseErrors, ground_jacobians, terrain_jacobians
 from wildlab.tracking.filters import thin
 from wildlab.tracking.kalman import transition_of_pose, transitions_of_pose
-from wildlab.tracking.many import Scan
-from wildlab.tracking.many.target_model import Sees
 from wildlab.tracking.sensors import POSE
+from wildlab.tracking.target_model import Scan, Sees
 
 #: An error of the clock moves a target by its speed, which nobody knows before it is tracked.
 UNKNOWN_EFFECT = "clock"

@@ -36,16 +36,8 @@ from wildlab.flight.manifest import (
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
 from wildlab.paths import DATA
-from wildlab.tracking.many import (
-    Hull,
-    ManySensorModel,
-    ManyTargetModel,
-    Scan,
-    Shown,
-    own_lasting,
-    run_many,
-    smooth_many,
-)
+from wildlab.tracking.multitarget import Shown, run_many, smooth_many
+from wildlab.tracking.target_model import Hull, ManySensorModel, ManyTargetModel, Scan, own_lasting
 
 #: How probable it is that what is in view is detected, where nobody says.
 DETECTION = 0.8

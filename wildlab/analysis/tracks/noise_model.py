@@ -27,7 +27,7 @@ from wildlab.flight.manifest import (
     settings_over,
 )
 from wildlab.flight.store import Flight
-from wildlab.geometry.attitude_uncertainty import level_axes
+from wildlab.geometry.covariances import level_axes
 from wildlab.geometry.frames import Array, wrap
 from wildlab.paths import DATA
 from wildlab.tracking.kalman import TOGETHER, Considered, consider_all

@@ -15,8 +15,8 @@ from wildlab.evaluation.pose_noise import estimate_position_noise
 from wildlab.flight.checks.sensors import looks_of_others
 from wildlab.flight.clocks import frame_times, gimbal_angles, poses_at, truth_at
 from wildlab.flight.store import Flight
-from wildlab.geometry.attitude_uncertainty import level_axes
 from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.covariances import level_axes
 from wildlab.geometry.frames import Array
 from wildlab.tracking.sensors import (
     POSE,
@@ -368,7 +368,7 @@ def _inside(nav: pd.DataFrame, times: Array) -> Array:
 
 _LEVEL = ("platform_north", "platform_east", "heading", "clock")
 #: Errors that may be considered, by kind of detection: the columns of ``H_pose``, in this order. Those of a
-#: camera's attitude are about level axes and the vertical, see `wildlab.geometry.attitude_uncertainty`.
+#: camera's attitude are about level axes and the vertical, see `wildlab.geometry.covariances`.
 SLOTS: dict[str, tuple[str, ...]] = {
     "position": _LEVEL,
     "range-bearing": (*_LEVEL, "range_bias"),

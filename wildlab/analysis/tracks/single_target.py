@@ -54,8 +54,9 @@ from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.tracking.filters import run_coloured, run_imm, run_unscented, thin
 from wildlab.tracking.kalman import Considered, consider_all
+from wildlab.tracking.kalman import errors_of as filter_errors
 from wildlab.tracking.motion import Motion
-from wildlab.tracking.run import Ends, Start, Track, run_filter, start_from_position
+from wildlab.tracking.run import Ends, Start, Track, known_before, run_filter, smooth, start_from_position
 from wildlab.tracking.sensors import (
     Merged,
     Prediction,
@@ -66,7 +67,6 @@ from wildlab.tracking.sensors import (
     second_derivatives,
     share_left_out,
 )
-from wildlab.tracking.smoothing import known_before, run_smoothed, smooth
 
 # -- where a track starts and where it ends
 
@@ -346,7 +346,7 @@ def run_named(
     base, smoothed = "ekf" if base == "kf" else base, name.endswith(SMOOTHED)
     times, _, R, sensor, *_ = merged
     R, motion = R[:, 0], targets.motion()
-    run = run_smoothed if smoothed else run_filter
+    errors = None
     if base == "coloured" and alone is not None:
         return _coloured(alone.scans, alone.noise, own, motion, begin)
     if base == "imm":
@@ -354,16 +354,17 @@ def run_named(
         return run_imm(times, own, R, sensor, both, (STAY_S, STAY_S), begin)
     if base in ("ekf", "ukf"):
         track = first if base == "ekf" else run_unscented(times, own, R, sensor, motion, begin)
-        track = smooth(track, motion) if smoothed else track
     elif base == "thinned" and alone is not None:
         kept = thin(times, alone.noise.thinning_s, first.used)[:, None]
-        track = run(times, np.where(kept, own, np.nan), R, sensor, motion, begin)
+        track = run_filter(times, np.where(kept, own, np.nan), R, sensor, motion, begin)
     elif considering is not None:
-        track = run(times, own, considering.R, considering.sensor, motion, begin, pose=considering.errors)
+        pose, errors = considering.errors, filter_errors(considering.errors, considering.sensor, len(times))
+        track = run_filter(times, own, considering.R, considering.sensor, motion, begin, pose=pose)
     else:
         return None
     if not smoothed:
         return track
+    track = smooth(track, motion, errors)
     # The innovations of a smoothed track are the filter's, and not counted twice.
     innovation, S, nis = (np.full_like(one, np.nan) for one in (track.innovation, track.S, track.nis))
     return track._replace(innovation=innovation, S=S, nis=nis)

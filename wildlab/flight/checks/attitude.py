@@ -48,8 +48,7 @@ from wildlab.flight.checks.inertial import (
 )
 from wildlab.flight.schema import FIELD, FORCE, POSITION, QUATERNION, RATE, VELOCITY, other_units
 from wildlab.flight.store import Flight
-from wildlab.geometry.frames import Array, matrix_to_euler, quaternion_to_matrix
-from wildlab.geometry.gravity import USUAL_GRAVITY
+from wildlab.geometry.frames import USUAL_GRAVITY, Array, matrix_to_euler, quaternion_to_matrix
 from wildlab.names import listed
 
 #: What is left between a good small sensor and a good attitude: turns (rad/s) and forces (m/s^2), and

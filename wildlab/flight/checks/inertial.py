@@ -34,8 +34,7 @@ from wildlab.flight.checks.known_points import best_of
 from wildlab.flight.clocks import gnss_times
 from wildlab.flight.schema import FORCE, POSITION, QUATERNION, RATE, SECOND_COLUMNS, VELOCITY
 from wildlab.flight.store import Flight
-from wildlab.geometry.frames import Array, Indices, quaternion_to_matrix
-from wildlab.geometry.gravity import USUAL_GRAVITY
+from wildlab.geometry.frames import USUAL_GRAVITY, Array, Indices, quaternion_to_matrix
 
 AXES = "xyz"
 

@@ -47,8 +47,8 @@ from wildlab.flight.clocks import between, frame_times, gimbal_angles, poses_at,
 from wildlab.flight.schema import POSITION
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera, normalise
+from wildlab.geometry.camera_poses import R_MC_DOWN, R_MC_FORWARD, Looks, Mount, camera_pose, camera_rotation
 from wildlab.geometry.frames import Array, Indices, Mask, Origin, euler_to_matrix, matrix_to_euler
-from wildlab.geometry.mount import R_MC_DOWN, R_MC_FORWARD, Looks, Mount, camera_pose, camera_rotation
 from wildlab.names import listed
 
 #: So many points say all there is to say, and fewer than so many say nothing.

@@ -52,7 +52,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "imu": (*FORCE, *RATE),
     "magnetometer": (*FIELD,),
     # Of the camera: how it is turned against north and the horizon (`..._world_...`: pitch -90 looks down),
-    # or against the airframe (pan and tilt as `wildlab.geometry.mount` has them).
+    # or against the airframe (pan and tilt as `wildlab.geometry.camera_poses` has them).
     "gimbal": (*WORLD, "pan_deg", "tilt_deg"),
     # Records of the autopilot that the camera was triggered.
     "triggers": (

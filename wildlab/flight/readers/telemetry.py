@@ -47,8 +47,7 @@ from wildlab.flight.readers.log import (
 )
 from wildlab.flight.readers.text import told
 from wildlab.flight.schema import FIELD, FORCE, QUATERNION, RATE, VELOCITY
-from wildlab.geometry.frames import Array, Mask
-from wildlab.geometry.gravity import STANDARD_GRAVITY
+from wildlab.geometry.frames import STANDARD_GRAVITY, Array, Mask
 
 #: MAV_AUTOPILOT_INVALID and MAV_TYPE_GCS: what is no autopilot says so in its heartbeat.
 _NO_AUTOPILOT, _GROUND_STATION = 8, 6

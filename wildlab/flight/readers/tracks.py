@@ -37,7 +37,7 @@ from wildlab.flight.readers import text
 from wildlab.flight.readers.log import UTC_OF_LOG, RawLog, Stream, holding, level_velocity, named
 from wildlab.flight.readers.text import number, numbers, parse_xml, plural, stamp_s, told
 from wildlab.flight.schema import VELOCITY
-from wildlab.geometry.attitude_uncertainty import tilt_from_roll_pitch
+from wildlab.geometry.covariances import tilt_from_roll_pitch
 from wildlab.geometry.frames import Array, Indices, Mask
 
 # -- NMEA 0183

@@ -20,7 +20,7 @@ from matplotlib.ticker import NullLocator
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.evaluation.consistency import chi_square_interval
-from wildlab.geometry.terrain import Terrain
+from wildlab.geometry.georeference import Terrain
 from wildlab.names import figure_name
 from wildlab.reporting.figures import (
     BLUE,

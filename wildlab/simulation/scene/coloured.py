@@ -153,7 +153,7 @@ def render_colour(
 
     Examples
     --------
-    >>> from wildlab.geometry.mount import R_MC_DOWN
+    >>> from wildlab.geometry.camera_poses import R_MC_DOWN
     >>> camera = Camera(64, 36, 100.0, 100.0, 31.5, 17.5)
     >>> rng = np.random.default_rng(1)
     >>> view = render_colour(Ground(), Tarpaulin(8.0, 4.0), camera, [0.0, 0.0, -50.0], R_MC_DOWN, rng)

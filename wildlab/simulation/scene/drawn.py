@@ -9,9 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.camera_poses import CameraPoses, Mount
 from wildlab.geometry.frames import Array, euler_to_matrix
-from wildlab.geometry.mount import Mount
 from wildlab.simulation.scene.bodies import Body, Hot, Layer, oval, rectangle
 from wildlab.simulation.scene.land import (
     ROCK,

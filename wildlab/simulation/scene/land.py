@@ -310,8 +310,8 @@ def render_land(scene: LandScene, camera: Camera, p_nc: ArrayLike, R_nc: ArrayLi
 
     Examples
     --------
-    >>> from wildlab.geometry import Camera
-    >>> from wildlab.geometry.mount import R_MC_DOWN
+    >>> from wildlab.geometry.camera import Camera
+    >>> from wildlab.geometry.camera_poses import R_MC_DOWN
     >>> from wildlab.simulation.scene.drawn import slab
     >>> from wildlab.simulation.scene.land import EVEN_LAND
     >>> camera = Camera(64, 48, 100.0, 100.0, 31.5, 23.5)

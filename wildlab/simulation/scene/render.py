@@ -227,8 +227,8 @@ def render(scene: Scene, camera: Camera, p_nc: ArrayLike, R_nc: ArrayLike) -> Re
 
     Examples
     --------
-    >>> from wildlab.geometry import Camera
-    >>> from wildlab.geometry.mount import R_MC_DOWN
+    >>> from wildlab.geometry.camera import Camera
+    >>> from wildlab.geometry.camera_poses import R_MC_DOWN
     >>> from wildlab.simulation.scene.bodies import rectangle
     >>> from wildlab.simulation.scene.render import EVEN
     >>> camera = Camera(64, 48, 100.0, 100.0, 31.5, 23.5)

@@ -25,7 +25,9 @@ from scipy.spatial import cKDTree
 
 from wildlab.geometry.frames import Array, wrap
 from wildlab.tracking.kalman import fade
-from wildlab.tracking.many.target_model import (
+from wildlab.tracking.motion import white_acceleration
+from wildlab.tracking.sensors import left_out
+from wildlab.tracking.target_model import (
     ManySensorModel,
     ManyTargetModel,
     largest_of,
@@ -34,8 +36,6 @@ from wildlab.tracking.many.target_model import (
     on_one_hull,
     own_columns,
 )
-from wildlab.tracking.motion import white_acceleration
-from wildlab.tracking.sensors import left_out
 
 
 def still_there(existence: ArrayLike, dt: ArrayLike, lifetime: float) -> Array:
@@ -210,7 +210,7 @@ class Tracks(NamedTuple):
     C
         (T, K, 4, k) covariance of a track's error, truth minus estimate, with each of k errors of sensors, in
         their standard deviations: those that all measurements of a scan share (`Scan.shared`), and behind
-        them those that each target has of its own (`wildlab.tracking.many.target_model.own_lasting`).
+        them those that each target has of its own (`wildlab.tracking.target_model.own_lasting`).
     kinds
         (T, K) probabilities.
     existence
@@ -624,7 +624,7 @@ def update(
     x, P, kinds
         (T, K, 4), (T, K, 4, 4) and (T, K) before the scan.
     own
-        (T, 1 + M) of `wildlab.tracking.many.tracks.after_scan`.
+        (T, 1 + M) of `wildlab.tracking.multitarget_tracks.after_scan`.
     C
         (T, K, 4, k) of `Tracks`; left out: no error is shared.
     """

@@ -12,41 +12,23 @@ themselves.
 
 Back over the tracks, once the flight is over, which measurements were of which target stays as it was taken
 at the time, and the covariance knows nothing of what was taken wrongly: among many false measurements it is
-too small. Kinds of hull stay merged.
-Errors that last, ``o``, stay considered and are not estimated. An estimate is corrected by what the smoother
-changed at the next row, ``x^s_k = x_k + G (x^s_k+1 - x_k+1|k)``, with the ``G`` of Rauch, Tung and Striebel's
-for the joint state. With ``e`` for truth minus estimate, the smoothed error is ``A e_k + B o_k`` and what is
-new, of covariance ``N``, and the three follow one row back: as in `wildlab.tracking.smoothing`, but from the
-moments before and after a measurement in place of its gain.
+too small. Kinds of hull stay merged, and errors that last stay considered: see `wildlab.tracking.run`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import eigh
 from scipy.spatial import cKDTree
 
 from wildlab.geometry.frames import Array
 from wildlab.tracking.association import association_probabilities
-from wildlab.tracking.kalman import fade
-from wildlab.tracking.many.target_model import (
-    LEAST_KIND,
-    ManySensorModel,
-    ManyTargetModel,
-    Scan,
-    at_least,
-    gather,
-    hull_noise,
-    largest_of,
-    near_side,
-    own_columns,
-    own_lasting,
-)
-from wildlab.tracking.many.tracks import (
+from wildlab.tracking.motion import white_acceleration
+from wildlab.tracking.multitarget_tracks import (
     Compared,
     Tracks,
     after_scan,
@@ -65,7 +47,20 @@ from wildlab.tracking.many.tracks import (
     weights,
     without_doubles,
 )
-from wildlab.tracking.motion import white_acceleration
+from wildlab.tracking.run import lasting_errors, smooth_moments
+from wildlab.tracking.target_model import (
+    LEAST_KIND,
+    ManySensorModel,
+    ManyTargetModel,
+    Scan,
+    at_least,
+    gather,
+    hull_noise,
+    largest_of,
+    near_side,
+    own_columns,
+    own_lasting,
+)
 
 #: How often what all tell each other is asked again. After the second time little changes.
 ROUNDS = 2
@@ -134,7 +129,7 @@ def moved_together(
     probabilities
         (T, 1 + M) by `compared`.
     gate
-        As in `wildlab.tracking.many.tracks.compare`.
+        As in `wildlab.tracking.multitarget_tracks.compare`.
     probable
         From likelihoods (T, K, M) to probabilities (T, 1 + M).
 
@@ -466,13 +461,14 @@ def smooth_many(
     density
         `ManyTargetModel.density` that it was run with.
     lasting_s
-        As `run_many` was given; behind it `wildlab.tracking.many.target_model.own_lasting` of its sensors.
+        As `run_many` was given; behind it `wildlab.tracking.target_model.own_lasting` of its sensors.
 
     Returns
     -------
     list of x, P
         For each scan (N, 4) and (N, 4, 4), in the order of its ``identity``.
     """
+    motion = partial(white_acceleration, density=density)
     after = [(one.x.copy(), one.P.copy()) for one in shown]
     rows: dict[int, list[tuple[int, int]]] = {}
     for scan, one in enumerate(shown):
@@ -482,75 +478,11 @@ def smooth_many(
         scans = np.array([scan for scan, _ in where])
         for part in np.split(np.arange(len(where)), np.flatnonzero(np.diff(scans) > 1) + 1):
             mine = [where[k] for k in part]
-            times = [shown[scan].time for scan, _ in mine]
+            times = np.array([shown[scan].time for scan, _ in mine])
             x, P, C = (
                 np.array([getattr(shown[scan], name)[place] for scan, place in mine]) for name in "xPC"
             )
-            x, P = smooth_considering(times, x, P, C, density, lasting_s)
+            x, P = smooth_moments(times, x, P, C, motion, lasting_errors(lasting_s, len(mine)))
             for (scan, place), mean, covariance in zip(mine, x, P, strict=True):
                 after[scan][0][place], after[scan][1][place] = mean, covariance
     return after
-
-
-def smooth_considering(
-    times: Sequence[float], x: Array, P: Array, C: Array, density: float, lasting_s: Sequence[float] = ()
-) -> tuple[Array, Array]:
-    """Back over one track.
-
-    Parameters
-    ----------
-    times
-        (N,) s, in order.
-    x, P, C
-        (N, 4), (N, 4, 4) and (N, 4, k) with all measurements up to then.
-    density, lasting_s
-        As in `smooth_many`.
-
-    Returns
-    -------
-    x, P
-        With all measurements. Without shared errors those of Rauch, Tung and Striebel.
-    """
-    after, spread = x.copy(), P.copy()
-    if not P[:, 2:].any() and P.shape[1] == 4:  # at rest: a speed that is known is not smoothed
-        after[:, :2], spread[:, :2, :2] = smooth_considering(
-            times, x[:, :2], P[:, :2, :2], C[:, :2], density, lasting_s
-        )
-        return after, spread
-    # The smoothed error is A e + B o and what later measurements and motion add, of covariance N.
-    n = x.shape[1]
-    A, B, N = np.eye(n), np.zeros_like(C[-1]), np.zeros((n, n))
-    for row in range(len(times) - 2, -1, -1):
-        dt = times[row + 1] - times[row]
-        F, Q = (one[:n, :n] for one in white_acceleration(dt, density))
-        left = np.array([fade(dt, float(one)) for one in lasting_s])
-        P_ahead, C_ahead = F @ P[row] @ F.T + Q, F @ C[row] * left
-        # The best gain leaves the error after a measurement uncorrelated with the innovation, so with the
-        # error before it has its own covariance in common; no more than there was, where mixtures grow.
-        size, axes = eigh(P[row + 1], P_ahead)
-        axes = P_ahead @ axes
-        common = (axes * np.minimum(size, 1)) @ axes.T
-        of_state, of_errors = _regress(common, C[row + 1], P_ahead, C_ahead)
-        N = N + A @ _positive(P[row + 1] - of_state @ common - of_errors @ C[row + 1].T) @ A.T
-        G, _ = _regress(P[row] @ F.T, C[row] * left, P_ahead, C_ahead)
-        after[row] = x[row] + G @ (after[row + 1] - F @ x[row])
-        by_motion, by_change = G @ (A @ of_state - np.eye(n)), G @ (A @ of_errors + B)
-        N = G @ N @ G.T + by_motion @ Q @ by_motion.T + (by_change * (1 - left**2)) @ by_change.T
-        A, B = np.eye(n) + by_motion @ F, by_change * left
-        both = A @ C[row] @ B.T
-        smoothed = A @ P[row] @ A.T + both + both.T + B @ B.T + N
-        spread[row] = (smoothed + smoothed.T) / 2
-    return after, spread
-
-
-def _positive(covariance: Array) -> Array:
-    """Without the directions in which it is below zero."""
-    values, axes = np.linalg.eigh((covariance + covariance.T) / 2)
-    return np.asarray((axes * np.maximum(values, 0.0)) @ axes.T)
-
-
-def _regress(by_state: Array, by_errors: Array, P: Array, C: Array) -> tuple[Array, Array]:
-    """Coefficients (n, 4) and (n, k) of a state's error and of errors of variance one, with covariances
-    ``P`` and ``C`` of their own, from the covariances (n, 4) and (n, k) with both."""
-    of_state = np.asarray(np.linalg.solve(P - C @ C.T, (by_state - by_errors @ C.T).T).T, float)
-    return of_state, by_errors - of_state @ C

@@ -1,4 +1,6 @@
-"""Rays and lines over bilinear patches, compiled: one walk from cell to cell that steps over whole blocks.
+"""Compiled: lenses without their distortion, attitudes between two others, rays and lines over terrain.
+
+Over bilinear patches it is one walk from cell to cell that steps over whole blocks.
 
 A patch is the bilinear surface over four neighbouring nodes. Along a ray its height is a quadratic in the
 ray's parameter, so where the ray meets it is known exactly; nothing is marched. A ray that stays above the
@@ -9,7 +11,7 @@ it; above the highest node nothing does. What hid the line before is tried first
 same ridge.
 
 Coordinates are those of the grid: ``x`` in columns (east), ``y`` in rows (north), ``z`` metres upwards.
-`wildlab.geometry.terrain` gives them their place in n.
+`wildlab.geometry.georeference` gives them their place in n.
 """
 
 from __future__ import annotations
@@ -17,12 +19,130 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from wildlab.geometry.compilation import compiled
+from wildlab.geometry.compilation import announced, compiled
 from wildlab.geometry.georeference import BELOW, HIT, MISSED, NO_DATA, NOT_KNOWN
 
-#: Any array: the types are the compiler's business.
+
+@compiled
+def undistort_rows(
+    points: Array, k1: float, k2: float, p1: float, p2: float, k3: float, tolerance: float
+) -> None:
+    """`wildlab.geometry.camera.undistort` of ``points`` (N, 2), in place."""
+    for i in range(len(points)):
+        u, v = points[i]
+        x, y = u, v
+        for step in range(51):
+            r2 = x * x + y * y
+            radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+            slope = 2 * (k1 + r2 * (2 * k2 + r2 * 3 * k3))
+            a = radial + slope * x * x + 2 * p1 * y + 6 * p2 * x
+            b = slope * x * y + 2 * p1 * x + 2 * p2 * y
+            d = radial + slope * y * y + 6 * p1 * y + 2 * p2 * x
+            determinant = a * d - b * b
+            miss_x = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x) - u
+            miss_y = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y - v
+            miss = max(abs(miss_x), abs(miss_y))
+            if not miss > tolerance or step == 50:
+                break
+            step_x = (d * miss_x - b * miss_y) / determinant
+            step_y = (a * miss_y - b * miss_x) / determinant
+            # A long step would leap over the fold of the polynomial.
+            length = np.hypot(step_x, step_y)
+            shortened = min(1.0, 0.3 / length) if length > 0 else 1.0
+            x, y = x - step_x * shortened, y - step_y * shortened
+        one_to_one = determinant > 0 and a > 0
+        solved = miss <= max(tolerance, 1e-12)
+        points[i, 0] = x if one_to_one and solved else np.nan
+        points[i, 1] = y if one_to_one and solved else np.nan
+
+
 Array = Any
+Rows = NDArray[np.intp]
+
+
+def between_attitudes(q_nb: ArrayLike, before: Rows, after: Rows, share: ArrayLike) -> Array:
+    """Rotations on the way from some attitudes to others, turning at an even rate the shorter way (slerp).
+
+    Parameters
+    ----------
+    q_nb
+        (M, 4) quaternions w, x, y, z, of any length but zero.
+    before, after
+        (N,) their rows to start from and to end at.
+    share
+        (N,) how far on the way, 0 at the start and 1 at the end.
+
+    Returns
+    -------
+    (N, 3, 3), takes a vector from b to n; NaN where the share or one of both quaternions is NaN or zero.
+
+    Examples
+    --------
+    Half-way from north to east is north-east:
+
+    >>> q = np.array([[1.0, 0.0, 0.0, 0.0], [np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)]])
+    >>> R = between_attitudes(q, np.array([0]), np.array([1]), np.array([0.5]))
+    >>> print(np.round(R[0] @ [1.0, 0.0, 0.0], 3))
+    [0.707 0.707 0.   ]
+    """
+    q, s = np.ascontiguousarray(q_nb, float), np.ascontiguousarray(share, float)
+    R = np.empty((len(s), 3, 3))
+    with announced("attitudes between two others"):
+        _fill(q, np.ascontiguousarray(before), np.ascontiguousarray(after), s, R)
+    return R
+
+
+@compiled
+def _fill(q: Array, before: Rows, after: Rows, share: Array, R: Array) -> None:
+    for k in range(len(share)):
+        i, j, s = before[k], after[k], share[k]
+        a, b, c, d = q[i, 0], q[i, 1], q[i, 2], q[i, 3]
+        e, f, g, h = q[j, 0], q[j, 1], q[j, 2], q[j, 3]
+        size, other = np.sqrt(a * a + b * b + c * c + d * d), np.sqrt(e * e + f * f + g * g + h * h)
+        if not (np.isfinite(s) and np.isfinite(size) and np.isfinite(other) and size > 0 and other > 0):
+            R[k] = np.nan
+            continue
+        a, b, c, d = a / size, b / size, c / size, d / size
+        e, f, g, h = e / other, f / other, g / other, h / other
+        # The turn from one to the other: the first backwards, then the second.
+        w = a * e + b * f + c * g + d * h
+        x = a * f - b * e - c * h + d * g
+        y = a * g + b * h - c * e - d * f
+        z = a * h - b * g + c * f - d * e
+        if w < 0:  # the same turn the shorter way
+            w, x, y, z = -w, -x, -y, -z
+        length = np.sqrt(x * x + y * y + z * z)
+        half = np.arctan2(length, w)
+        # sin(s half) / sin(half), which is s where both vanish.
+        scale = np.sin(s * half) / length if length > 1e-12 else s
+        w, x, y, z = np.cos(s * half), scale * x, scale * y, scale * z
+        a, b, c, d = (
+            a * w - b * x - c * y - d * z,
+            a * x + b * w + c * z - d * y,
+            a * y - b * z + c * w + d * x,
+            a * z + b * y - c * x + d * w,
+        )
+        size = a * a + b * b + c * c + d * d
+        R[k, 0, 0], R[k, 0, 1], R[k, 0, 2] = (
+            1 - 2 * (c * c + d * d) / size,
+            2 * (b * c - a * d) / size,
+            2 * (b * d + a * c) / size,
+        )
+        R[k, 1, 0], R[k, 1, 1], R[k, 1, 2] = (
+            2 * (b * c + a * d) / size,
+            1 - 2 * (b * b + d * d) / size,
+            2 * (c * d - a * b) / size,
+        )
+        R[k, 2, 0], R[k, 2, 1], R[k, 2, 2] = (
+            2 * (b * d - a * c) / size,
+            2 * (c * d + a * b) / size,
+            1 - 2 * (b * b + c * c) / size,
+        )
+
+
+#: Any array: the types are the compiler's business.
 
 #: Cells along each side of the smallest block that is stepped over, as a power of two.
 FIRST = 2
