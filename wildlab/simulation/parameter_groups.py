@@ -226,7 +226,7 @@ class TwinCamera(Strict):
 
 
 class TwinMount(Strict):
-    """The mount; misalignment as H prints it (see `geometry.mount.helgesen_misalignment`).
+    """The mount; misalignment as H prints it (see `wildlab.geometry.camera_poses.helgesen_misalignment`).
 
     Looks down unless it says so. What was not calibrated is there, and nobody knows it.
     """
