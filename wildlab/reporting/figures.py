@@ -654,4 +654,5 @@ def figure_html(
     slides = " slides" if least > PHONE_WIDTH else ""
     box = f'class="scroll{slides}" role="group" tabindex="0" aria-label="Figure {ordinal}"'
     label = f"<figcaption><b>Figure {ordinal}.</b> {inline(caption)}</figcaption>" if caption else ""
-    return f"<figure{' data-main' if main else ''}><div {box}>{image}</div>{label}</figure>"
+    part = ' data-part="main"' if main else ""
+    return f"<figure{part}><div {box}>{image}</div>{label}</figure>"

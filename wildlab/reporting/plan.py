@@ -93,7 +93,6 @@ def plan_page(
     level = "warn" if against else "neutral"
     report.summary(result["sentences"], level=level, verdict=(texts[found], reason))
     report.tiles(_tiles(plan, result, wording))
-    report.section(texts["map"])
     _show_map(wording, plan, covered, result)
     wording.table("areas", _areas(result))
     wording.table("flights", _flights(result))
