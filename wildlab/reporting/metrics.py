@@ -47,8 +47,6 @@ from wildlab.evaluation.shares import FITTED, NO_PREMISE, SHARE_VERDICTS, UNDECI
 VERDICTS = (*SHARE_VERDICTS, NO_PREMISE, UNDECIDABLE, FITTED)
 #: The metric that tells by its subject which poses others were held against; its value is at how many times.
 AGAINST = "compared_with"
-#: What an earlier version wrote besides.
-_GONE = frozenset({"below"})
 
 
 def _plain(value: Any) -> float | int | None:
@@ -251,9 +249,7 @@ def read_metrics(path: Path) -> dict[str, Any]:
     """
     try:
         raw = json.loads(path.read_text(encoding="utf-8"), parse_constant=_no_constant)
-        metrics = [
-            metric(**{key: entry[key] for key in entry if key not in _GONE}) for entry in raw["metrics"]
-        ]
+        metrics = [metric(**entry) for entry in raw["metrics"]]
         claims = [claim(**entry) for entry in raw["claims"]]
         return document(**{**raw, "metrics": metrics, "claims": claims})
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
