@@ -26,23 +26,10 @@ from wildlab.terminal import count, print_json, print_table, sentence, shown, st
 
 
 class Commands(click.Group):
-    """Commands in the order in which they are needed, and a hint where a name is misspelt."""
+    """Commands in the order in which they are needed."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(self.commands)
-
-    def resolve_command(
-        self, ctx: click.Context, args: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        from difflib import get_close_matches
-
-        try:
-            return super().resolve_command(ctx, args)
-        except click.UsageError as error:
-            near = get_close_matches(args[0], self.commands, n=1)
-            if not near or "did you mean" in error.message.lower():
-                raise
-            raise click.UsageError(f"{error.message} Did you mean {near[0]!r}?", ctx) from error
 
 
 SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 100}

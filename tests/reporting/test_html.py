@@ -189,8 +189,8 @@ PARTS = {
     "tiles": '<ul class="tiles"><li>tiles</li></ul>',
     "advice": f'<h2 data-part="{ADVICE}">advice</h2>\n<p>do this</p>',
     "limits": f'<h2 data-part="{LIMITS}">limits</h2>\n<ul><li>doubt</li></ul>',
-    "numbers": f"<h2>numbers</h2>\n<p>before</p><figure>{IMAGE}<figcaption><b>Figure 1.</b> picture"
-    "</figcaption></figure><p>after</p>",
+    "numbers": f'<h2>numbers</h2>\n<p>before</p><figure data-part="main">{IMAGE}'
+    "<figcaption><b>Figure 1.</b> picture</figcaption></figure><p>after</p>",
     "method": f'<details class="method" data-part="{METHOD}"><summary>by</summary><p>thus</p></details>',
 }
 
@@ -205,17 +205,17 @@ def test_any_order_of_the_parts_becomes_the_one(names):
     assert all(html.count(word) == 1 for word in wanted) and "data-part" not in html
 
 
-def test_the_marked_figure_is_the_main_one_and_figures_are_counted_as_they_stand():
+def test_the_marked_figure_stands_first():
     one = report()
     one.head("Title")
     one.section("Section")
-    for name in ("a", "b", "c"):
+    for name in ("b", "a", "c"):
         one.figure(new_figure()[0], name=name, alt=name, caption=f"Shows {name}.", main=name == "b")
     soup = BeautifulSoup(order_report("\n".join(one.parts)), "html.parser")
     captions = [caption.get_text() for caption in soup.find_all("figcaption")]
     assert captions == ["Figure 1. Shows b.", "Figure 2. Shows a.", "Figure 3. Shows c."]
     assert [box["aria-label"] for box in soup.find_all(role="group")] == ["Figure 1", "Figure 2", "Figure 3"]
-    assert soup.find(attrs={"data-main": True}) is None
+    assert soup.find(attrs={"data-part": True}) is None
     first, heading = soup.find("figure"), soup.h2
     assert isinstance(first, Tag) and heading in first.find_all_next()
 

@@ -119,8 +119,8 @@ def test_round_trip(tmp_path):
 @pytest.mark.parametrize(
     ("make", "sentence"),
     [
-        (lambda: metric("Error", "b", 1.0, "m"), "name 'Error'"),
-        (lambda: metric("a", "two words", 1.0, "m"), "subject 'two words'"),
+        (lambda: metric("Error", "b", 1.0, "m"), "not made of a-z"),
+        (lambda: metric("a", "two words", 1.0, "m"), "has a blank"),
         (lambda: metric("a", "b", math.inf, "m"), "infinite"),
         (lambda: metric("a", "b", 1.0, "m", low=2.0, high=1.0), "above the high one"),
         (lambda: whole(kind="dream"), "kind 'dream'"),

@@ -33,7 +33,7 @@ def made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, ...
 
     monkeypatch.setattr(flights, "twin_flight", make)
     monkeypatch.setattr(flights, "dataset_flight", make)
-    monkeypatch.setattr(flights, "load_flight", lambda folder: folder)
+    monkeypatch.setattr("wildlab.flight.store.load_flight", lambda folder: folder)
     return calls
 
 

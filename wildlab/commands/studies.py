@@ -181,7 +181,7 @@ def vary(study: str, by: str, seeds: int, jobs: int, reports: Path) -> None:
 
     Each group of chosen parameters is multiplied, the filters' tuning left alone; the table names the
     verdicts that turn. A moved flight shows its target in as many images as it does, at most in as many as
-    are printed. What is computed is kept; the study's report shows the table from its next run on.
+    are printed. What is computed is kept.
 
     \b
     Examples:

@@ -247,27 +247,18 @@ def _figure(
     value, low, high = (
         [scale * _plain(entry[part]) for _, entry in found] for part in ("value", "low", "high")
     )
-    least, most = int(np.argmin(value)), int(np.argmax(value))
     unit = f" ({quantity.unit})" if quantity.unit else ""
     title = f"{quantity.label[:1].upper()}{quantity.label[1:]}"
-    values = {
-        "what": f"{title}{unit}",
-        "n": len(found),
-        "all": len(flights),
-        "value": number(value[least]),
-        "first": found[least][0],
-        "least": number(value[least]),
-        "last": found[most][0],
-        "most": number(value[most]),
-    }
-    (words,) = wording.messages([Message("same" if value[least] == value[most] else "span", values)])
+    (said,) = wording.messages(
+        [Message("drawn", {"what": f"{title}{unit}", "n": len(found), "all": len(flights)})]
+    )
     goal = None if quantity.goal is None else scale * quantity.goal
     names = [name if len(name) <= 24 else f"{name[:22]}…" for name, _ in found]
     dots = {"": Values(value, np.array([low, high]))}
     chart = rows_chart(names, dots, f"{quantity.label}{unit}", size=(4.6, 1.3 + 0.36 * len(names)))
     if goal is not None:
         chart.axes[0].axvline(goal, color=GREY, **DASHED)
-    return chart, quantity.key.replace("_", "-"), words, words
+    return chart, quantity.key.replace("_", "-"), said, said
 
 
 def _reasons(flights: Sequence[OwnFlight]) -> list[Message]:

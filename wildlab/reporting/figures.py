@@ -64,10 +64,8 @@ def filter_words(name: str) -> str:
 FULL_SIZE, LEAST_SIZE = 128, 80
 #: CSS pixels that the smallest letters of a figure have on a phone; where they do not fit, it scrolls.
 LEAST_TEXT = 11.0
-#: A share of the figure that a title has at least, and where it begins to have it, pixels from the edge.
-_NARROWEST, _EDGE = 0.7, 8.0
-#: How often the whole is laid out again at most.
-_ROUNDS = 4
+#: Pixels that a title keeps from the figure's edge, and the share of its row that the name of a side has.
+_EDGE, _UPWARDS = 8.0, 0.6
 #: Letters that a line of a title has at least.
 _FEWEST = 10
 #: The space between a number and its unit.
@@ -107,16 +105,23 @@ def fit_text(figure: Figure) -> None:
     _harmless(figure)
     for legend in list(figure.legends):
         _narrow(figure, legend)
-    titles = [figure._suptitle, figure._supxlabel]  # type: ignore[attr-defined]
-    titles += [text for axes in figure.get_axes() for text in _names_of(axes)[:-1]]
-    for text in filter(None, titles):
-        _break(text, figure.bbox.width - 2 * _EDGE)
-    # Once is enough but for what stands beside or above much: where its lines change, the panels move.
-    for _ in range(_ROUNDS):
-        lay_out(figure)
-        broken = [_fit(figure, axes, text) for axes in figure.get_axes() for text in _names_of(axes)]
-        if not any(broken):
-            break
+    wide, high = figure.bbox.width, figure.bbox.height
+    for text in filter(None, (figure._suptitle, figure._supxlabel)):  # type: ignore[attr-defined]
+        _break(text, wide - 2 * _EDGE)
+    for axes in figure.get_axes():
+        spec = axes.get_subplotspec()
+        rows, columns = (1, 1) if spec is None else spec.get_gridspec().get_geometry()
+        *across, upwards = _names_of(axes)
+        for text in across:
+            _break(text, wide / columns - 2 * _EDGE)
+        _break(upwards, _UPWARDS * high / rows, "height")
+    lay_out(figure)
+    # A title that would leave the figure begins before its panel.
+    for axes in figure.get_axes():
+        for text in _names_of(axes)[:-1]:
+            beyond = text.get_window_extent().x1 - (wide - _EDGE)
+            if beyond > 0:
+                text.set_x(text.get_position()[0] - beyond / axes.get_window_extent().width)
     for axes in figure.get_axes():
         names = [text for text in axes.texts if text.get_gid() == END_LABEL and isinstance(text, Annotation)]
         if len(names) > 1:
@@ -207,34 +212,6 @@ def lay_out(figure: Figure) -> None:
         for axes in figure.get_axes():
             axes.apply_aspect()
         engine.execute(figure)
-
-
-def _fit(figure: Figure, axes: Axes, text: Text) -> bool:
-    """Break a title or the name of a side onto more lines where it is longer than its room; whether it was.
-
-    A title may go on to the figure's edge, or, beside another panel, to the end of its own; one beside long
-    names on the axis begins at the figure's edge.
-    """
-    box, panel, before = figure.bbox, axes.get_window_extent(), text.get_text()
-    spec = axes.get_subplotspec()
-    alone, upwards = spec is None or spec.get_gridspec().ncols == 1, text is axes.yaxis.label
-    over = figure._suptitle  # type: ignore[attr-defined]
-    top = box.y1 - (0 if over is None else over.get_window_extent().height)
-    side, low, high, end = (
-        ("height", panel.y0, panel.y1, top) if upwards else ("width", panel.x0, panel.x1, box.x1)
-    )
-    reach = end - 4 if alone or upwards else high
-    if text.get_horizontalalignment() == "left" and not upwards:
-        room = reach - low
-        if alone and text.get_window_extent().width > room < _NARROWEST * box.width:
-            text.set_x((_EDGE - low) / panel.width)
-            room = reach - _EDGE
-    else:
-        middle = (low + high) / 2
-        room = 2 * min(middle, reach - middle)
-    if getattr(text.get_window_extent(), side) > room + 1:
-        _break(text, room, side)
-    return bool(text.get_text() != before)
 
 
 def _break(text: Text, room: float, side: str = "width") -> None:
@@ -654,4 +631,5 @@ def figure_html(
     slides = " slides" if least > PHONE_WIDTH else ""
     box = f'class="scroll{slides}" role="group" tabindex="0" aria-label="Figure {ordinal}"'
     label = f"<figcaption><b>Figure {ordinal}.</b> {inline(caption)}</figcaption>" if caption else ""
-    return f"<figure{' data-main' if main else ''}><div {box}>{image}</div>{label}</figure>"
+    part = ' data-part="main"' if main else ""
+    return f"<figure{part}><div {box}>{image}</div>{label}</figure>"

@@ -6,7 +6,6 @@ What the page says follows by rules from what was tracked and how it compares wi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,7 @@ import pandas as pd
 from wildlab.analysis.tracks.ground_positions import counts_twice, platform_errors
 from wildlab.analysis.tracks.many import ManyTracks
 from wildlab.analysis.tracks.tracker import FEWEST
-from wildlab.evaluation.identities import Gospa, Identities
+from wildlab.evaluation.identities import Identities
 from wildlab.messages.catalogue import Message, load_texts
 from wildlab.messages.quantities import length, percent_of
 from wildlab.names import listed
@@ -251,24 +250,6 @@ def tracks_table(followed: ManyTracks, lives: Identities | None) -> pd.DataFrame
     return pd.DataFrame(rows)
 
 
-def parts_table(found: Sequence[Gospa]) -> pd.DataFrame:
-    """What GOSPA is made of: roots of mean squares over the scans, and shares of the square."""
-    names = load_texts("tracking-many").quantities
-    squares = {
-        "distance": float(np.mean([one.localisation**2 for one in found])),
-        "missed": float(np.mean([one.missed**2 for one in found])),
-        "false": float(np.mean([one.false**2 for one in found])),
-    }
-    every = sum(squares.values())
-    rows = [
-        {"part": names["gospa"], "metres": float(np.mean([one.distance for one in found])), "share": np.nan}
-    ]
-    for key, square in squares.items():
-        share = 100 * square / every if every else np.nan
-        rows.append({"part": names[key], "metres": float(np.sqrt(square)), "share": share})
-    return pd.DataFrame(rows)
-
-
 # -- what is recorded, and the page
 
 
@@ -318,8 +299,6 @@ def show_many(report: Report, followed: ManyTracks, lives: Identities | None) ->
         report.figures([*shown, charts.wrong_shown(followed, lives)])
     if lives is not None and lives.targets:
         wording.table("targets", targets_table(lives))
-        apart = {"each": f"{followed.cutoff_m / np.sqrt(2):.1f}", "cutoff": f"{followed.cutoff_m:g}"}
-        wording.table("parts", parts_table(lives.gospa), apart)
     report.limits(wording.messages(limits(followed)))
     report.section("Details")
     wording.table("tracks", tracks_table(followed, lives))

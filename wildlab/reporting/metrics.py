@@ -25,22 +25,28 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    model_validator,
+)
 
 from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import FITTED, NO_PREMISE, SHARE_VERDICTS, UNDECIDABLE
 
-KINDS = ("logged", "twin", "computed")
 VERDICTS = (*SHARE_VERDICTS, NO_PREMISE, UNDECIDABLE, FITTED)
 #: The metric that tells by its subject which poses others were held against; its value is at how many times.
 AGAINST = "compared_with"
-#: What an earlier version wrote besides.
-_GONE = frozenset({"below"})
 
 
 def _plain(value: Any) -> float | int | None:
@@ -61,8 +67,17 @@ def _known(verdict: str) -> str:
     return verdict
 
 
-Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
-Subject = Annotated[str, Field(pattern=r"^\S+$")]
+def _made_of(pattern: str, otherwise: str) -> AfterValidator:
+    def check(text: str) -> str:
+        if not re.fullmatch(pattern, text):
+            raise ValueError(otherwise)
+        return text
+
+    return AfterValidator(check)
+
+
+Name = Annotated[str, _made_of("[a-z][a-z0-9_]*", "it is not made of a-z, 0-9 and _")]
+Subject = Annotated[str, _made_of(r"\S+", "it is empty or has a blank")]
 Plain = Annotated[float | int | None, BeforeValidator(_plain)]
 Count = Annotated[int | None, BeforeValidator(lambda value: None if value is None else int(value))]
 Share = Annotated[Annotated[float, Field(ge=0, le=1)] | None, BeforeValidator(_plain)]
@@ -234,9 +249,7 @@ def read_metrics(path: Path) -> dict[str, Any]:
     """
     try:
         raw = json.loads(path.read_text(encoding="utf-8"), parse_constant=_no_constant)
-        metrics = [
-            metric(**{key: entry[key] for key in entry if key not in _GONE}) for entry in raw["metrics"]
-        ]
+        metrics = [metric(**entry) for entry in raw["metrics"]]
         claims = [claim(**entry) for entry in raw["claims"]]
         return document(**{**raw, "metrics": metrics, "claims": claims})
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:

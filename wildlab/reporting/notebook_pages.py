@@ -69,12 +69,10 @@ def arrange_parts(soup: BeautifulSoup) -> None:
             at = part
         groups[at if part is None else part].append(node)
     soup.extend(node for part in ORDER for node in groups[part])
-    _put_first(soup, _main_picture([one for part in (OPENING, ADVICE, SECTION) for one in groups[part]]))
     _judge(groups[SUMMARY], groups[VERDICT])
-    for marked in soup.select("[data-part], [data-main]"):
-        del marked["data-part"], marked["data-main"]
+    for marked in soup.select("[data-part]"):
+        del marked["data-part"]
     _drop_bare_headings(soup)
-    _number_figures(soup)
 
 
 def _part_of(node: Tag) -> str | None:
@@ -98,31 +96,6 @@ def _judge(summaries: list[PageElement], verdicts: list[PageElement]) -> None:
     box.append(last)
 
 
-def _main_picture(blocks: list[PageElement]) -> Tag | None:
-    """The figure that stands first: the one marked so, else the first that is not folded away."""
-    figures = [
-        one
-        for block in blocks
-        if isinstance(block, Tag)
-        for one in ([block] if block.name == "figure" else block.find_all("figure"))
-        if one.find("img") and not one.find_parent("details")
-    ]
-    marked = [one for one in figures if one.get("data-main") is not None]
-    return next(iter(marked or figures), None)
-
-
-def _put_first(soup: BeautifulSoup, chosen: Tag | None) -> None:
-    """Put the main picture below summary and alerts, and take away the row that it alone stood in."""
-    if chosen is None:
-        return
-    row = chosen.parent
-    chosen.extract()
-    if row is not None and row.name == "div" and not row.find("figure"):
-        row.extract()
-    above = [one for one in soup.find_all(recursive=False) if _part_of(one) in (HEAD, SUMMARY, ALERT)]
-    above[-1].insert_after(chosen)
-
-
 def _drop_bare_headings(soup: BeautifulSoup) -> None:
     """Headings of sections whose only figure stands above now, and which say nothing besides."""
     for heading in soup.find_all(["h2", "h3"]):
@@ -134,18 +107,6 @@ def _drop_bare_headings(soup: BeautifulSoup) -> None:
             or (after.name == "details" and "method" in after.get_attribute_list("class"))
         ):
             heading.decompose()
-
-
-def _number_figures(soup: BeautifulSoup) -> None:
-    """Count figures as they now stand; tables keep their numbers, for they keep their order."""
-    figures = [one for one in soup.find_all("figure") if one.find("img")]
-    for ordinal, figure in enumerate(figures, start=1):
-        box = figure.find("div", class_="scroll")
-        if isinstance(box, Tag) and str(box.get("aria-label", "")).startswith("Figure "):
-            box["aria-label"] = f"Figure {ordinal}"
-        label = figure.select_one("figcaption > b")
-        if label is not None and re.fullmatch(r"Figure \d+\.", label.get_text()):
-            label.string = f"Figure {ordinal}."
 
 
 FILE = DATA / "glossary.toml"

@@ -93,7 +93,6 @@ def plan_page(
     level = "warn" if against else "neutral"
     report.summary(result["sentences"], level=level, verdict=(texts[found], reason))
     report.tiles(_tiles(plan, result, wording))
-    report.section(texts["map"])
     _show_map(wording, plan, covered, result)
     wording.table("areas", _areas(result))
     wording.table("flights", _flights(result))
@@ -148,18 +147,12 @@ def _show_map(wording: Wording, plan: Plan, covered: Sequence[Covered], result: 
     handles += [ground[kind] for kind in sorted(shown)]
     ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3)
     north, east = np.ptp(np.concatenate([area.outline for area in plan.areas.areas]), axis=0)
-    each = " ".join(
-        f"{one['name']}: {percent(one['seen'])} seen, {percent(one['hidden'])} hidden, "
-        f"{percent(one['blurred'])} blurred."
-        for one in result["areas"][:NAMED]
-    )
     wording.values |= {
         "seen": percent(result["seen"]),
         "areas": count(len(plan.areas.areas), "area"),
         "rows": count(len(plan.pattern.rows), "row"),
         "north": f"{north:.0f}",
         "east": f"{east:.0f}",
-        "each": each,
     }
     wording.figure("map", fig, main=True)
 

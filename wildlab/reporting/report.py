@@ -202,8 +202,7 @@ class Report:
         alt
             What a reader who cannot see it should know; never empty.
         main
-            Whether it is the page's main picture, which stands right below the summary. Without one, the
-            first figure is.
+            Whether it is the page's main picture, which stands right below the summary: show it first.
         """
         self._show(self._figure(fig, name, alt, caption, main=main))
 

@@ -462,8 +462,9 @@ def _show_figures(
             mine = flight.truth["target_id"] == target
             truth = flight.truth.loc[mine, ["north_m", "east_m"]].to_numpy(float)
         maps.append(charts.map_shown(followed, target, name, truth, platforms))
+    fig, own, alt, caption = maps[0]
+    report.figure(fig, name=own, alt=alt, caption=caption, main=True)
     report.section("Tracks")
-    report.figures(maps[:1])
     if len(maps) > 1:
         report.figures(maps[1:], fold="Maps of other targets")
     pairs = list(dict.fromkeys(zip(shown["sensor"], shown["target"], strict=True)))

@@ -25,7 +25,6 @@ from wildlab.flight.store import Flight
 from wildlab.messages.catalogue import PageTexts, load_texts
 from wildlab.paths import REPORTS
 from wildlab.reporting.report import Report, open_report
-from wildlab.runner import vary
 from wildlab.runner.catalogue import StudyEntry, find_study, flights_for, load_studies
 from wildlab.runner.scheduling import compute_seeds
 from wildlab.runner.seeds import (
@@ -200,14 +199,6 @@ class OpenStudy:
         own = (self.twin,) if self.flights and self.twin else ()
         if own or twins:
             show_twins(self.report, [*own, *(one for one in twins if one not in own)], self.entry.name)
-        kept = vary.kept_table(self.name, self.out)
-        if kept is not None:
-            self.report.table(
-                kept[0],
-                columns=vary.COLUMNS,
-                digits={"factor": 2, "turned": 0},
-                fold="Verdicts that turn where chosen parameters are moved",
-            )
         self.report.save()
 
 

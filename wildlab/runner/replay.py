@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn
 
 from wildlab.analysis.tracks.tracker import read_estimates
 from wildlab.errors import WildlabError
@@ -67,8 +65,12 @@ def replay(
     report = None if (folder / FILE_NAME).exists() else folder
     place = folder if report is None else flight_of(folder)
     flight = load_flight(place)
-    with _progress(console) as tell:
-        tell("reading the flight", None, None)
+    with nullcontext() if console is None else console.status("reading the flight") as status:
+
+        def tell(what: str) -> None:
+            if status is not None:
+                status.update(what)
+
         tell_source(flight, source, console)
         scene = scene_of(flight, source, estimates_of(flight, report, reports))
         scene, shots = _with_images(scene, place, images, tell)
@@ -81,14 +83,14 @@ def replay(
                 field="--out",
             )
         target.mkdir(parents=True, exist_ok=True)
-        tell("writing", None, None)
+        tell("writing")
         write_atomic(target / PAGE, page(scene, shots))
         save_recording(scene, target / RECORDING, shots)
     return [target / PAGE, target / RECORDING], scene
 
 
 def _with_images(
-    scene: ReplayScene, flight: Path, images: Path | None, tell: Any
+    scene: ReplayScene, flight: Path, images: Path | None, tell: Callable[[str], None]
 ) -> tuple[ReplayScene, dict[int, bytes]]:
     place = images or images_of(flight)
     if scene.views is None:
@@ -99,7 +101,7 @@ def _with_images(
     size = None if scene.camera is None else (scene.camera.width, scene.camera.height)
     seen = set() if scene.sightings is None else set(scene.sightings.frame.tolist())
     ids = list(scene.views.ids)
-    found = read_shots(place, ids, size, seen, lambda done, of: tell("reducing images", done, of))
+    found = read_shots(place, ids, size, seen, lambda done, of: tell(f"reducing images: {done} of {of}"))
     return replace(scene, lacks=(*scene.lacks, *found.lacks)), found.by_row
 
 
@@ -146,18 +148,3 @@ def flight_of(report: Path) -> Path:
             file=report,
         )
     return flight_of_report(report, theirs, "wildlab replay flights/mine --out REPORT")
-
-
-@contextmanager
-def _progress(console: Console | None) -> Iterator[Any]:
-    if console is None:
-        yield lambda what, done, of: None
-        return
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed:.0f}"))
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
-        task = progress.add_task("", total=None)
-
-        def tell(what: str, done: int | None, of: int | None) -> None:
-            progress.update(task, description=what, completed=done or 0, total=of)
-
-        yield tell

@@ -7,7 +7,6 @@ these flights stand beside those of as many flights of the twin as it is.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +16,6 @@ import numpy as np
 import pandas as pd
 
 from wildlab.errors import RunFailed, WildlabError
-from wildlab.files import write_json
 from wildlab.paths import REPORTS
 from wildlab.reporting.published import judge, load_claims, published_rows
 from wildlab.reporting.report import open_report
@@ -36,8 +34,6 @@ from wildlab.simulation.parameters import groups_of, load_twin
 from wildlab.studies.page import decide_claims, record_spread
 from wildlab.studies.protocol import VARIED, Study, split_keys
 
-#: Where tables are kept among the reports.
-STORE = ".vary"
 #: By what parameters are multiplied, and over how many flights, where nothing else is asked for.
 FACTORS, SEEDS = (0.5, 0.8, 1.25, 2.0), 20
 #: The move that moves nothing, which the others are compared with.
@@ -82,7 +78,7 @@ def vary_study(
     Returns
     -------
     DataFrame
-        `turned_table`; it is also kept for the study's report, see `kept_table`.
+        `turned_table`.
 
     Raises
     ------
@@ -125,16 +121,7 @@ def vary_study(
             raise RunFailed(reason, "mend that first")
         verdicts = {} if reason else _verdicts(study, case, work)
         moved.append(Moved(group, factor, verdicts, reason))
-    table = turned_table(moved)
-    rows = [
-        {**row, "turned": None if np.isnan(row["turned"]) else row["turned"]}
-        for row in table.to_dict(orient="records")
-    ]
-    content = {"study": name, "seeds": seeds, "rows": rows}
-    path = reports / STORE / f"{name}.json"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write_json(path, content)
-    return table
+    return turned_table(moved)
 
 
 def turned_table(moved: Sequence[Moved]) -> pd.DataFrame:
@@ -164,28 +151,6 @@ def turned_table(moved: Sequence[Moved]) -> pd.DataFrame:
             }
         )
     return pd.DataFrame(rows, columns=["group", "factor", "turned", "of", "which"])
-
-
-def kept_table(study: str, out: str = "") -> tuple[pd.DataFrame, int] | None:
-    """The table that `vary_study` has left for a study's report, and of how many flights; None without one.
-
-    Parameters
-    ----------
-    out
-        The notebook's parameter: the report's folder.
-    """
-    reports = Path(out).parent if out else REPORTS
-    try:
-        content = json.loads((reports / STORE / f"{study}.json").read_text(encoding="utf-8"))
-        table = pd.DataFrame(content["rows"], columns=["group", "factor", "turned", "of", "which"])
-        table = table.astype({"factor": float, "turned": float})
-        return table, int(content["seeds"])
-    except (OSError, ValueError, KeyError, TypeError):
-        return None
-
-
-#: Headings of the table in a report.
-COLUMNS = {"group": "chosen parameters", "factor": "times", "turned": "verdicts turned", "which": "which"}
 
 
 def _work(

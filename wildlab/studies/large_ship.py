@@ -26,7 +26,7 @@ from wildlab.reporting.charts.drawing import (
     finish,
     new_strips,
 )
-from wildlab.reporting.figures import BLUE, GREEN, INK, VERMILLION, map_axes, new_figure
+from wildlab.reporting.figures import BLUE, INK, VERMILLION, map_axes, new_figure
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.twins import simulate_twin
 from wildlab.studies.vessel_detection import (
@@ -296,8 +296,8 @@ def positions(tracked: Mapping[str, Tracked], names: Mapping[str, str]) -> Figur
     errors = {who: -errors_of(one)[0][one.seen.detected] for who, one in tracked.items()}
     reach = 1.08 * max(float(np.abs(e).max()) for e in errors.values())
     for ax, (who, e) in zip(axes, errors.items(), strict=True):
-        draw_errors(ax, e, _COLOURS[who], names[who].capitalize(), reach)
-        ax.plot(0, 0, "o", mfc="none", mec=GREEN, ms=9, mew=2)
+        draw_errors(ax, e, _COLOURS[who], reach)
+        ax.set_title(names[who].capitalize())
         map_axes(ax, scale_bar=False, north="north (m)" if ax is axes[0] else "")
     return fig
 

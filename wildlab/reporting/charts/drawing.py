@@ -20,6 +20,7 @@ from matplotlib.ticker import NullLocator
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.evaluation.consistency import chi_square_interval
+from wildlab.geometry.covariances import chi2_quantile
 from wildlab.geometry.georeference import Terrain
 from wildlab.names import figure_name
 from wildlab.reporting.figures import (
@@ -31,6 +32,7 @@ from wildlab.reporting.figures import (
     PURPLE,
     SKY,
     VERMILLION,
+    ellipse,
     log_band,
     mark_gaps,
     new_figure,
@@ -301,14 +303,21 @@ def spread_points(count: int, width: float) -> Array:
     return np.asarray(width * (2 * ((np.arange(count) * 0.618034) % 1) - 1))
 
 
-def draw_errors(ax: Axes, errors: ArrayLike, color: str, title: str, reach: float | None = None) -> None:
-    """Draw errors (N, 2), upwards and to the right, and their mean; axes reach as far each way."""
-    e = np.asarray(errors, float)
+def draw_errors(ax: Axes, errors: ArrayLike, color: str, reach: float | None = None) -> None:
+    """Draw errors (N, 2) north-east about the truth, their mean, and the ellipse that holds 90 % of a normal
+    distribution; ``reach`` is the half width in metres, for panels that are to be compared."""
+    e = np.asarray(errors, float).reshape(-1, 2)
     e = e[np.isfinite(e).all(axis=1)]
-    draw_dots(ax, e[:, 1], e[:, 0], color, size=7)
-    ax.plot(*e.mean(axis=0)[::-1], "+", color=INK, ms=12, mew=2)
-    reach = reach or 1.1 * float(np.abs(e).max())
-    ax.set(xlim=(-reach, reach), ylim=(-reach, reach), title=title)
+    draw_dots(ax, e[:, 1], e[:, 0], color, size=6)
+    far = float(np.abs(e).max(initial=0.0))
+    if len(e) > 2:
+        ellipse(ax, e.mean(axis=0)[::-1], np.cov(e[:, ::-1].T), color=color)
+        half = np.sqrt(e.var(axis=0, ddof=1) * chi2_quantile(0.9, 2))
+        far = max(far, float((np.abs(e.mean(axis=0)) + half).max()))
+    ax.plot(*e.mean(axis=0)[::-1], "o", mfc="white", mec=color, ms=7, mew=1.6)
+    ax.plot(0, 0, "+", color=TRUTH["color"], ms=13, mew=2)
+    reach = reach or max(1.0, 1.1 * far)
+    ax.set(xlim=(-reach, reach), ylim=(-reach, reach))
 
 
 #: Signs of places in an image: style, colour and size.

@@ -26,7 +26,7 @@ from wildlab.analysis.tracks.tracker import TrackingResult, is_at_rest, whitened
 from wildlab.evaluation.consistency import autocorrelation, chi_square_interval, white_bound
 from wildlab.evaluation.errors import SLOWEST_M_S
 from wildlab.evaluation.identities import Identities
-from wildlab.geometry.covariances import chi2_quantile, ellipse_axes
+from wildlab.geometry.covariances import ellipse_axes
 from wildlab.messages.catalogue import fill, load_texts
 from wildlab.messages.quantities import length
 from wildlab.names import figure_name
@@ -39,6 +39,7 @@ from wildlab.reporting.charts.drawing import (
     Shown,
     correlations_chart,
     draw_dots,
+    draw_errors,
     draw_line,
     draw_platform,
     draw_way,
@@ -60,7 +61,6 @@ from wildlab.reporting.figures import (
     VERMILLION,
     Powers,
     colour,
-    ellipse,
     end_label,
     filter_words,
     map_axes,
@@ -291,21 +291,12 @@ def error_scatter(errors: ArrayLike, color: str = BLUE, reach: float | None = No
 
     ``reach`` is the half width of the map in metres, for figures that are to be compared.
     """
-    e = _finite(errors)
     fig, ax = new_figure(4.6, 4.4)
-    far = np.abs(e).max(initial=0.0)
-    draw_dots(ax, e[:, 1], e[:, 0], color, size=6)
-    if len(e) > 2:
-        ellipse(ax, e.mean(axis=0)[::-1], np.cov(e[:, ::-1].T), color=color)
-        half = np.sqrt(e.var(axis=0, ddof=1) * chi2_quantile(0.9, 2))
-        far = max(far, float((np.abs(e.mean(axis=0)) + half).max()))
-    reach = reach or max(1.0, 1.1 * float(far))
-    ax.plot(*e.mean(axis=0)[::-1], "o", mfc="white", mec=color, ms=7, mew=1.6)
-    north, east = e.mean(axis=0) if len(e) else (0.0, 0.0)
+    draw_errors(ax, errors, color, reach)
     # Its name stands away from what lies north and east of it.
-    ax.plot(0, 0, "+", color=colour("truth"), ms=13, mew=2)
+    e = _finite(errors)
+    north, east = e.mean(axis=0) if len(e) else (0.0, 0.0)
     mark_place(ax, (0.0, 0.0), "truth", below=bool(north >= 0), aside=-8 if east > 0 else 8)
-    ax.set(xlim=(-reach, reach), ylim=(-reach, reach))
     map_axes(ax, east="error, east (m)", north="error, north (m)")
     return finish(fig)
 
