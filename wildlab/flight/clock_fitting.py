@@ -5,12 +5,15 @@ from __future__ import annotations
 
 import re
 import zoneinfo
-from bisect import bisect_left
 from datetime import UTC, datetime, timedelta, timezone, tzinfo
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import linprog
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import min_weight_full_bipartite_matching
 
 from wildlab.errors import WildlabError
 
@@ -157,10 +160,8 @@ def _under(dx: Array, dy: Array, at_0: float, rate: float) -> _Line:
     left = dy - at_0 - rate * dx
     low = float(np.quantile(left, 0.05)) if len(left) > 20 else -np.inf
     kept = left >= 4 * low - 2 * RESOLUTION_S if low < 0 else np.ones(len(left), bool)
-    above_0, slope, below, slope_sd = lower_line(dx[kept], left[kept])
-    used = np.zeros(len(dx), bool)
-    used[np.flatnonzero(kept)[below]] = True
-    return at_0 + above_0, rate + slope, used, slope_sd
+    above_0, slope, slope_sd = lower_line(dx[kept], left[kept])
+    return at_0 + above_0, rate + slope, kept, slope_sd
 
 
 #: Height at zero, slope, the points that it rests on, and the standard deviation of the slope.
@@ -239,21 +240,15 @@ def fit_steady(
     return ClockFit(middle, middle + offset, rate, used, fit.rate_sd)
 
 
-#: Stamps under the line are early, and outliers, where it rises by so many of its own standard deviations
-#: without them; so often is it tried what the next two that it rests on hide.
-EARLY, PEELS = 10.0, 10
-#: Fewer stamps are all believed: among them the least delays are too far apart to tell.
-FEW_STAMPS = 60
-#: What can lie on the hull, or come to: so many of the lowest in each of so many stretches.
+#: What the line may rest on: so many of the lowest in each of so many stretches.
 STRETCHES, LOWEST = 200, 12
 
 
-def lower_line(x: Array, y: Array) -> _Line:
+def lower_line(x: Array, y: Array) -> tuple[float, float, float]:
     """The line under all points that has the least sum of distances above it.
 
-    It is the edge of the lower convex hull under the mean of ``x``. A few points far under all others are
-    left out. How well the line is known follows from how close together the lowest distances lie: where
-    the density of delays at no delay is f, the least of N is off by 1 / (N f).
+    How well it is known follows from how close together the lowest distances lie: where the density of
+    delays at no delay is f, the least of N is off by 1 / (N f).
 
     Parameters
     ----------
@@ -262,82 +257,25 @@ def lower_line(x: Array, y: Array) -> _Line:
 
     Returns
     -------
-    Height at zero, slope, the points it rests on, and the standard deviation of the slope, infinite where
-    there are fewer than four points.
+    Height at zero, slope, and the standard deviation of the slope, infinite where there are fewer than four
+    points.
     """
-    x_0 = float(x.mean())
-    near = _lowest(x, y)
-    kept = near
-    at_0, slope, support = _edge(x[kept], y[kept], x_0)
-    best, start = (at_0, slope, kept), at_0 + slope * x_0
-    for peel in range(1, 1 + min(PEELS, len(x) // FEW_STAMPS)):
-        kept = np.delete(kept, support)
-        at_0, slope, support = _edge(x[kept], y[kept], x_0)
-        sd, _ = _spreads(x, y - at_0 - slope * x)
-        # Without outliers each round lifts the line by about the distance between neighbours.
-        if at_0 + slope * x_0 - start > (EARLY + 2 * peel) * max(sd, 1e-7):
-            best = (at_0, slope, kept)
-    at_0, slope, kept = best
-    above = y - at_0 - slope * x
-    middle_sd, slope_sd = _spreads(x, above)
-    if len(kept) < len(near):
-        # What went with the outliers and is none comes back.
-        good = near[above[near] >= -3 * middle_sd]
-        at_0, slope, _ = _edge(x[good], y[good], x_0)
-        above = y - at_0 - slope * x
-        # Where some are early, others may be, by less than it takes to be seen.
-        slope_sd = 3 * _spreads(x, above)[1]
-    return at_0, slope, above >= -1e-6, slope_sd
-
-
-def _lowest(x: Array, y: Array) -> NDArray[np.intp]:
-    """Rows of the lowest points in each stretch of x."""
-    if len(x) <= STRETCHES * LOWEST:
-        return np.arange(len(x))
-    stretch = np.minimum(((x - x.min()) / np.ptp(x) * STRETCHES).astype(int), STRETCHES - 1)
-    order = np.lexsort((y, stretch))
-    first = np.searchsorted(stretch[order], stretch[order])
-    return np.sort(order[np.arange(len(x)) - first < LOWEST])
-
-
-def _edge(x: Array, y: Array, mean: float) -> tuple[float, float, list[int]]:
-    """Height at zero and slope of the hull's edge under a mean of x, and the rows that it rests on."""
-    order = np.lexsort((y, x))
-    # Of equal x only the lowest can be on the hull.
-    order = order[np.concatenate([[True], np.diff(x[order]) > 0])]
-    px, py = x[order].tolist(), y[order].tolist()
-    hull: list[int] = []
-    for i in range(len(px)):
-        while len(hull) > 1:
-            a, b = hull[-2], hull[-1]
-            if (px[b] - px[a]) * (py[i] - py[a]) > (py[b] - py[a]) * (px[i] - px[a]):
-                break
-            hull.pop()
-        hull.append(i)
-    if len(hull) == 1:
-        return py[hull[0]], 0.0, [int(order[hull[0]])]
-    at = int(np.clip(np.searchsorted([px[i] for i in hull], mean), 1, len(hull) - 1))
-    a, b = hull[at - 1], hull[at]
-    slope = (py[b] - py[a]) / (px[b] - px[a])
-    return py[a] - slope * px[a], slope, [int(order[a]), int(order[b])]
-
-
-def _spreads(x: Array, above: Array) -> tuple[float, float]:
-    """Standard deviations of the line at the middle and of its slope, from distances above it (N,)."""
-    if len(x) < 4 or np.ptp(x) == 0:
-        return np.inf, np.inf
+    near = np.arange(len(x))
+    if len(x) > STRETCHES * LOWEST:
+        stretch = np.minimum(((x - x.min()) / np.ptp(x) * STRETCHES).astype(int), STRETCHES - 1)
+        near = pd.Series(y).sort_values().groupby(stretch).head(LOWEST).index.to_numpy()
+    A = np.column_stack([np.ones(len(near)), x[near]])
+    at_0, slope = linprog([-1.0, -x.mean()], A, y[near], bounds=(None, None)).x
     # The two that the line rests on say nothing; a handful above them tells how dense delays are there.
-    lowest = np.sort(above[above >= 0])[2:]
-    if len(lowest) < 2:
-        return np.inf, np.inf
-    many = int(np.clip(round(np.sqrt(len(lowest))), 2, 30))
-    many = min(many, len(lowest))
-    spacing = float(lowest[many - 1]) / many
+    lowest = np.sort(y - at_0 - slope * x)[2:]
+    if len(lowest) < 2 or np.ptp(x) == 0:
+        return float(at_0), float(slope), np.inf
+    many = min(int(np.clip(round(np.sqrt(len(lowest))), 2, 30)), len(lowest))
     # The same from the fifth alone, which is more where small delays are rare.
-    spacing = max(spacing, 0.25 * float(lowest[min(4, len(lowest) - 1)]))
+    spacing = max(lowest[many - 1] / many, 0.25 * lowest[min(4, len(lowest) - 1)])
     # A least value is as far off, in the mean, as it spreads; a line has two ends to find, and half of the
     # points for each.
-    return 2.0 * spacing, 2.3 * spacing / float(np.std(x))
+    return float(at_0), float(slope), 2.3 * float(spacing) / float(np.std(x))
 
 
 Index = NDArray[np.intp]
@@ -479,36 +417,15 @@ def _settle(s: Array, t: Array, offset: float, near: float) -> tuple[float, Inde
 def _pair(at: Array, t: Array, near: float) -> Index:
     """Pairs (K, 2) in order of time, no further apart than `near`, most and nearest first."""
     low, high = np.searchsorted(t, at - near), np.searchsorted(t, at + near, side="right")
-    # Best sums so far by the last trigger used: triggers and sums both rise along the lists.
-    ends: list[int] = []
-    sums: list[float] = []
-    heads: list[int] = []
-    chain: list[tuple[int, int, int]] = []
-    for i in range(len(at)):
-        new = []
-        for j in range(int(low[i]), int(high[i])):
-            before = bisect_left(ends, j) - 1
-            worth = 2.0 - ((t[j] - at[i]) / near) ** 2 + (sums[before] if before >= 0 else 0.0)
-            new.append((j, worth, heads[before] if before >= 0 else -1))
-        for j, worth, head in new:
-            place = bisect_left(ends, j)
-            if place > 0 and sums[place - 1] >= worth:
-                continue
-            last = place
-            while last < len(ends) and sums[last] <= worth:
-                last += 1
-            if place < len(ends) and ends[place] == j and sums[place] > worth:
-                continue
-            chain.append((i, j, head))
-            ends[place:last] = [j]
-            sums[place:last] = [worth]
-            heads[place:last] = [len(chain) - 1]
-    pairs = []
-    head = heads[-1] if heads else -1
-    while head >= 0:
-        i, j, head = chain[head]
-        pairs.append((i, j))
-    return np.array(pairs[::-1], np.intp).reshape(-1, 2)
+    image = np.repeat(np.arange(len(at)), high - low)
+    trigger = np.concatenate([np.empty(0, np.intp), *map(np.arange, low, high)])
+    # No image has to have a trigger: each may take a place of its own behind all of them instead.
+    cost = np.r_[1.0 + ((t[trigger] - at[image]) / near) ** 2, np.full(len(at), 3.0)]
+    places = np.r_[image, np.arange(len(at))], np.r_[trigger, len(t) + np.arange(len(at))]
+    image, trigger = min_weight_full_bipartite_matching(coo_array((cost, places)).tocsr())
+    paired = trigger < len(t)
+    # On a line nearest pairs need not cross.
+    return np.column_stack([image[paired], np.sort(trigger[paired])])
 
 
 # -- scales of time, and zones
