@@ -12,7 +12,7 @@ from tests.flight.conftest import fault
 from wildlab.errors import WildlabError
 from wildlab.flight.checks.check import check_flight
 from wildlab.flight.importing import import_flight
-from wildlab.flight.readers.autoferry import SENSORS, read_part
+from wildlab.flight.readers.tracks import SENSORS, read_part
 from wildlab.flight.store import Flight, load_flight
 from wildlab.paths import DATA
 
@@ -86,17 +86,19 @@ def test_truth_is_each_sample_once():
     ("change", "said"),
     [
         ('{"sensorID": 5}', "sensorID"),
-        ('{"time": "noon"}', "time: 'noon' does"),
-        (f'{{"time": 1{"0" * 400}}}', "time: 1"),
-        ('{"ownshipPosition": [4.0, 1e9]}', "ownshipPosition[1]: 1000000000.0 does"),
+        ('{"sensorID": {}}', "sensorID"),
+        ('{"time": "noon"}', "time"),
+        (f'{{"time": 1{"0" * 400}}}', "time"),
+        ('{"ownshipPosition": [4.0, 1e9]}', "ownshipPosition"),
+        ('{"ownshipPosition": [4.0]}', "ownshipPosition"),
         ('{"sensorID": 1, "measurement": [1.0, 2.0, 3.0]}', "measurement"),
-        ('{"sensorID": 1, "measurement": [[1.0, 2.0], [3.0]]}', "measurement: as many norths"),
-        ('{"sensorID": 2, "measurement": [[1.0, "x"], [3.0, 4.0]]}', "measurement: 'x'"),
-        ('{"measurement": [0.1, 57.0]}', "measurement: 57"),
+        ('{"sensorID": 1, "measurement": [[1.0, 2.0], [3.0]]}', "measurement"),
+        ('{"sensorID": 2, "measurement": [[1.0, "x"], [3.0, 4.0]]}', "measurement"),
+        ('{"measurement": [0.1, 57.0]}', "measurement"),
     ],
 )
 def test_hostile_detections_are_refused(change, said):
-    with pytest.raises(WildlabError, match=fault(f"log.json, {said}")):
+    with pytest.raises(WildlabError, match=fault(f"log.json, {said}: frame 1")):
         read([GOOD[0] | json.loads(change)], "radar")
 
 

@@ -265,7 +265,7 @@ def lower_line(x: Array, y: Array) -> tuple[float, float, float]:
         stretch = np.minimum(((x - x.min()) / np.ptp(x) * STRETCHES).astype(int), STRETCHES - 1)
         near = pd.Series(y).sort_values().groupby(stretch).head(LOWEST).index.to_numpy()
     A = np.column_stack([np.ones(len(near)), x[near]])
-    at_0, slope = linprog([-1.0, -x.mean()], A, y[near], bounds=(None, None)).x
+    at_0, slope = np.array(linprog([-1.0, -x.mean()], A, y[near], bounds=(None, None)).x)
     # The two that the line rests on say nothing; a handful above them tells how dense delays are there.
     lowest = np.sort(y - at_0 - slope * x)[2:]
     if len(lowest) < 2 or np.ptp(x) == 0:
@@ -422,10 +422,10 @@ def _pair(at: Array, t: Array, near: float) -> Index:
     # No image has to have a trigger: each may take a place of its own behind all of them instead.
     cost = np.r_[1.0 + ((t[trigger] - at[image]) / near) ** 2, np.full(len(at), 3.0)]
     places = np.r_[image, np.arange(len(at))], np.r_[trigger, len(t) + np.arange(len(at))]
-    image, trigger = min_weight_full_bipartite_matching(coo_array((cost, places)).tocsr())
-    paired = trigger < len(t)
+    row, place = min_weight_full_bipartite_matching(coo_array((cost, places)).tocsr())
+    paired = place < len(t)
     # On a line nearest pairs need not cross.
-    return np.column_stack([image[paired], np.sort(trigger[paired])])
+    return np.column_stack([row[paired], np.sort(place[paired])]).astype(np.intp)
 
 
 # -- scales of time, and zones

@@ -34,9 +34,9 @@ from wildlab.errors import WildlabError
 from wildlab.flight.clock_fitting import TriggerMatch, find_zone, match_triggers
 from wildlab.flight.files import did_you_mean, inside, printable, read_regular
 from wildlab.flight.readers import FOLDERS, read_folder, read_log
-from wildlab.flight.readers.autoferry import Part, read_part
 from wildlab.flight.readers.log import RawLog, Stream
 from wildlab.flight.readers.photos import of_camera
+from wildlab.flight.readers.tracks import Part, read_part
 from wildlab.flight.recipes import Decimal, LogTable, MatlabTable, Quantity, Series, Stamp
 from wildlab.flight.schema import Dimension, factor
 

@@ -32,8 +32,8 @@ from wildlab.flight.manifest import (
     UncertaintyPart,
 )
 from wildlab.flight.readers import FOLDERS, FORMATS
-from wildlab.flight.readers.autoferry import Part
 from wildlab.flight.readers.log import PARTS
+from wildlab.flight.readers.tracks import Part
 from wildlab.flight.schema import Dimension, factor
 from wildlab.names import listed
 

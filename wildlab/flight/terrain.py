@@ -2,7 +2,7 @@
 
 A node of the grid at north N and east E has the height of the point of the map's surface that has these very
 coordinates in n. Where that lies in the map depends on how deep it is, a little: n's verticals are parallel,
-the Earth's are not. So its depth is sought by iteration, which gains three digits a turn, between two depths.
+the Earth's are not. So its depth is sought by iteration, which gains three digits a turn.
 """
 
 from __future__ import annotations
@@ -94,15 +94,6 @@ def places_of(elevation: ElevationMap, origin: Origin, added: float) -> MapPlace
     return MapPlaces(elevation, origin, added, there.transform, back.transform)
 
 
-def depths_of(places: MapPlaces, extent: Extent, heights: tuple[float, float]) -> tuple[float, float]:
-    """Down (m) above and below all ground over an extent, whose heights in the map are the lowest and the
-    highest."""
-    high = -(heights[1] + places.added - places.origin[2]) - 10.0
-    # The ground falls behind the horizon: down grows by the square of the distance over twice the radius.
-    far = max(map(abs, extent)) ** 2 / 6e6
-    return high, -(heights[0] + places.added - places.origin[2]) + far + 10.0
-
-
 def resample(
     heights: Heights, corner: tuple[int, int], every: int, places: MapPlaces, extent: Extent, step: float
 ) -> Terrain:
@@ -132,31 +123,18 @@ def resample(
     columns = int(np.floor((extent.far_east - extent.east) / step)) + 1
     out = np.empty((rows, columns), np.float32)
     east = extent.east + step * np.arange(columns)
-    downs = depths_of(places, extent, (float(np.nanmin(heights)), float(np.nanmax(heights))))
+    middle = places.origin[2] - places.added - float(np.nanmean(heights))
     at_once = max(1, AT_ONCE // columns)
     for first in range(0, rows, at_once):
         north = extent.north + step * np.arange(first, min(first + at_once, rows))
         N, E = (grid.ravel() for grid in np.meshgrid(north, east, indexing="ij"))
-        ends = [places.of_points(np.column_stack([N, E, np.full(N.size, down)])).T for down in downs]
-        out[first : first + len(north)] = _surface(heights, corner, every, ends, downs).reshape(-1, columns)
+        p = np.column_stack([N, E, np.full(N.size, middle)])
+        for _ in range(3):
+            column, row, height = places.of_points(p).T
+            ground = bilinear(heights, (row - corner[0]) / every - 0.5, (column - corner[1]) / every - 0.5)
+            p[:, 2] += np.nan_to_num(height - ground)
+        out[first : first + len(north)] = np.where(np.isnan(ground), np.nan, -p[:, 2]).reshape(-1, columns)
     return Terrain(out, extent.north, extent.east, step)
-
-
-def _surface(
-    heights: Heights, corner: tuple[int, int], every: int, ends: list[Array], downs: tuple[float, float]
-) -> Array:
-    """Heights in n (N,), metres above the plane ``down = 0``, of verticals with ends (3, N) at two depths:
-    columns, rows and heights in the map, linear between."""
-    top, bottom = ends
-    share = np.full(top.shape[1], 0.5)
-    for _ in range(3):
-        column, row, _height = top + share * (bottom - top)
-        found = bilinear(heights, (row - corner[0]) / every - 0.5, (column - corner[1]) / every - 0.5)
-        share = (found - top[2]) / (bottom[2] - top[2])
-        known = np.isfinite(share)
-        share[~known] = 0.5
-    down = downs[0] + share * (downs[1] - downs[0])
-    return np.where(known, -down, np.nan)
 
 
 def bilinear(heights: Heights, rows: Array, columns: Array) -> Array:

@@ -130,17 +130,6 @@ def test_a_message_whose_kind_was_damaged_costs_itself():
     assert (found.lost_bytes, found.places) == (len(pieces[at]), 1)
 
 
-def test_definitions_that_change_hold_from_there_on():
-    log, other = Log("A QB TimeUS,W"), Log("A Qff TimeUS,V,W")
-    log.add("A", 1, 7)
-    other.add("A", 2, 0.25, 8)
-    found = read_records(log.binary() + other.binary())
-    assert found.lost_bytes == 0
-    table = found.tables["A"]
-    assert table.get("W").tolist() == [7, 8]
-    np.testing.assert_array_equal(table.get("V"), [np.nan, 0.25])
-
-
 def test_filling_at_the_end_is_no_loss_and_a_cut_message_is():
     data = second_generation(Truth(2025), 3.0).binary()
     for filling in (b"\0" * 5000, b"\xff" * 5000):

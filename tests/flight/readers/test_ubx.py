@@ -4,7 +4,6 @@ import io
 from datetime import UTC, datetime
 
 import numpy as np
-import pytest
 from pyubx2 import GET, UBXMessage, UBXReader
 
 from tests.flight.readers.tracks import Reader, check, columns_of, near
@@ -13,7 +12,7 @@ from wildlab.flight.readers.tracks import frames
 ubx = Reader("ubx")
 
 #: 2025-03-01 12:00:00 UTC is so many s into GPS week 2355.
-WEEK, TOW = 2355, 6 * 86400 + 43200 + 18
+TOW = 6 * 86400 + 43200 + 18
 UTC_S = datetime(2025, 3, 1, 12, tzinfo=UTC).timestamp()
 
 
@@ -29,21 +28,6 @@ def pvt(k: int, **other: object) -> bytes:
         **{"hMSL": 100000, "hAcc": 900, "vAcc": 1500, "velN": 1000, "velE": -2000, "velD": 30, "sAcc": 50},
     }
     return message("NAV-PVT", **{**fields, **other})
-
-
-def old(k: int, *left_out: str, **other: object) -> bytes:
-    stamp = {"iTOW": 1000 * (TOW + k)}
-    said = {
-        "NAV-POSLLH": {"lon": 10.4, "lat": -63.4 + 1e-5 * k, "height": 1000, "hMSL": 500, "hAcc": 4000},
-        "NAV-VELNED": {"velN": 100, "velE": -200, "velD": 3, "sAcc": 40},
-        "NAV-SOL": {
-            **{"fTOW": 0, "week": WEEK, "gpsFix": 3, "gpsfixOK": 1, "wknSet": 1, "towSet": 1, "numSV": 7},
-            **other,
-        },
-        "NAV-TIMEGPS": {"fTOW": -250, "week": WEEK, "leapS": 18, "towValid": 1, "weekValid": 1},
-        "NAV-DOP": {"hDOP": 1.25},
-    }
-    return b"".join(message(name, **stamp, **one) for name, one in said.items() if name not in left_out)
 
 
 def test_equals_pyubx2(shared_data):
@@ -99,19 +83,6 @@ CASES = [
 def test_kinds_of_fixes_and_why_some_are_not_used():
     columns = columns_of(ubx, b"".join(pvt(k, **case) for k, (case, _, _) in enumerate(CASES)))
     assert list(zip(columns["fix"], columns["why"], strict=True)) == [case[1:] for case in CASES]
-
-
-@pytest.mark.parametrize("left_out", [(), ("NAV-SOL",), ("NAV-TIMEGPS",), ("NAV-VELNED", "NAV-DOP")])
-def test_old_receivers(left_out):
-    k = np.arange(8)
-    columns = columns_of(ubx, b"".join(old(i, *left_out) for i in range(8)))
-    near(columns, 1e-6, time_s=UTC_S + k)
-    near(columns, latitude_deg=-63.4 + 1e-5 * k, height_ellipsoid_m=1.0, height_sea_m=0.5)
-    assert ("v_north_m_s" in columns) == ("NAV-VELNED" not in left_out)
-    if "v_north_m_s" in columns:
-        near(columns, v_east_m_s=-2.0)
-    assert ("fix" in columns) == ("NAV-SOL" not in left_out)
-    assert columns["use"].all()
 
 
 def test_attitude_of_nav_att():

@@ -10,7 +10,6 @@ once. In the text form a line is a message, its values already in their units.
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -53,8 +52,6 @@ Index = NDArray[np.int64]
 HEAD = b"\xa3\x95"
 #: Kind and length of messages that define the others.
 FMT_KIND, FMT_BYTES = 128, 89
-#: Definitions of one name that are believed: a log that changes them more often is damaged.
-MOST_LAYOUTS = 8
 #: numpy's type of each format character.
 TYPES: dict[str, str | tuple[str, int]] = {
     "a": ("<i2", 32),
@@ -158,80 +155,43 @@ def definition(body: bytes) -> Definition | None:
 
 
 def read_records(data: bytes) -> Records:
-    """All messages of a binary log."""
+    """All messages of a binary log; of several definitions of a kind the first holds."""
     raw = np.frombuffer(data, np.uint8)
     heads = np.flatnonzero((raw[:-2] == HEAD[0]) & (raw[1:-1] == HEAD[1])).astype(np.int64)
-    known, which = _definitions(data, raw, heads)
-    heads, which = heads[which >= 0], which[which >= 0]
-    ends = heads + np.array([one.length for one in known], np.int64)[which]
-    begins = _boundaries(heads, ends, len(raw))
-    heads, which, ends = heads[begins], which[begins], ends[begins]
-    return Records(_tables(raw, known, heads, which), *_left_over(raw, heads, ends))
-
-
-def _definitions(data: bytes, raw: Bytes, heads: Index) -> tuple[list[Definition], Index]:
-    """Definitions, and which holds for each head (-1: none): the last before it, or else the first."""
-    known: list[Definition] = [FMT]
-    since: dict[int, list[tuple[int, int]]] = {FMT_KIND: [(0, 0)]}
-    numbered: dict[Definition, int] = {FMT: 0}
-    seen: dict[bytes, Definition | None] = {}
-    of_name: Counter[str] = Counter()
+    known = {FMT_KIND: FMT}
     for head in heads[raw[heads + 2] == FMT_KIND].tolist():
-        body = data[head + 3 : head + FMT_BYTES]
-        if body not in seen:
-            seen[body] = definition(body)
-        found = seen[body]
-        if found is None or found.kind == FMT_KIND:
-            continue
-        if found not in numbered:
-            of_name[found.name] += 1
-            believed = of_name[found.name] <= MOST_LAYOUTS
-            numbered[found] = len(known) if believed else -1
-            known += [found] if believed else []
-        of_kind = since.setdefault(found.kind, [])
-        if not of_kind or of_kind[-1][1] != numbered[found]:
-            of_kind.append((head, numbered[found]))
+        if found := definition(data[head + 3 : head + FMT_BYTES]):
+            known.setdefault(found.kind, found)
+    lengths = np.zeros(256, np.int64)
+    lengths[list(known)] = [one.length for one in known.values()]
+    heads = heads[lengths[raw[heads + 2]] > 0]
+    heads = heads[_boundaries(heads, heads + lengths[raw[heads + 2]], len(raw))]
     kinds = raw[heads + 2]
-    which = np.full(len(heads), -1, np.int64)
-    for kind, versions in since.items():
-        rows = np.flatnonzero(kinds == kind)
-        begun = np.searchsorted([at for at, _ in versions], heads[rows], side="right") - 1
-        which[rows] = np.array([version for _, version in versions])[np.maximum(begun, 0)]
-    return known, which
+    tables = {
+        one.name: _table(raw, one, heads[rows], rows + 1)
+        for kind, one in known.items()
+        if len(rows := np.flatnonzero(kinds == kind))
+    }
+    return Records(tables, *_left_over(raw, heads, heads + lengths[kinds]))
 
 
-def _boundaries(heads: Index, ends: Index, size: int) -> Mask:
-    """(N,) heads that begin a message; the others are bytes of a message that look like one.
+def _boundaries(heads: Index, ends: Index, size: int) -> list[int]:
+    """Those of the heads that begin a message; the others are bytes of a message that look like one.
 
-    A head is sure where another head, or the end of the file, follows its message. One that is not is
-    believed unless a sure one lies within its message: then its length is wrong.
+    A head is sure where its message ends at another head, or the file does. Where it does not, and a sure one
+    lies within its message, it was damaged, and costs itself.
     """
-    count = len(heads)
-    begins = np.zeros(count, bool)
-    if not count:
-        return begins
-    # Where the message of each head ends: the head there, or the first one after.
-    follows = np.arange(1, count + 1)
-    sure = np.zeros(count, bool)
-    sure[:-1] = ends[:-1] == heads[1:]
-    odd = np.flatnonzero(~sure)
-    follows[odd] = np.searchsorted(heads, ends[odd])
-    next_heads = heads[np.minimum(follows[odd], count - 1)]
-    sure[odd] = (ends[odd] == size) | ((follows[odd] < count) & (next_heads == ends[odd]))
+    follows = np.searchsorted(heads, ends)
+    sure = (ends == size) | (heads[np.minimum(follows, len(heads) - 1)] == ends)
+    begins: list[int] = []
     at = 0
-    breaks = iter(odd.tolist())
-    stop = next(breaks)
-    while at < count:
-        while stop < at:
-            stop = next(breaks, count)
-        # The last head is always a break: nothing follows it.
-        begins[at : stop + 1] = True
-        after = int(follows[stop])
-        if not sure[stop]:
-            within = np.flatnonzero(sure[stop + 1 : after])
-            if ends[stop] > size or len(within):
-                begins[stop] = False
-                after = stop + 1 + (int(within[0]) if len(within) else 0)
+    while at < len(heads):
+        after = int(follows[at])
+        if sure[at] or (ends[at] <= size and not sure[at + 1 : after].any()):
+            begins.append(at)
+        else:
+            within = np.flatnonzero(sure[at + 1 : after])
+            after = at + 1 + (int(within[0]) if len(within) else 0)
         at = after
     return begins
 
@@ -245,17 +205,6 @@ def _left_over(raw: Bytes, heads: Index, ends: Index) -> tuple[int, int, bool]:
     if len(rest) and rest[0] in (0, 255) and (rest == rest[0]).all():
         gaps[-1] = 0
     return int(gaps.sum()), int((gaps > 0).sum()), bool(gaps[-1] > 0)
-
-
-def _tables(raw: Bytes, known: list[Definition], heads: Index, which: Index) -> dict[str, MessageTable]:
-    by_kind = np.argsort(which, kind="stable")
-    cuts = np.searchsorted(which[by_kind], np.arange(len(known) + 1))
-    parts: dict[str, list[MessageTable]] = {}
-    for version, one in enumerate(known):
-        rows = by_kind[cuts[version] : cuts[version + 1]]
-        if len(rows):
-            parts.setdefault(one.name, []).append(_table(raw, one, heads[rows], rows + 1))
-    return {name: merge(tables) for name, tables in parts.items()}
 
 
 def _table(raw: Bytes, one: Definition, heads: Index, rows: Index) -> MessageTable:
@@ -276,25 +225,6 @@ def _table(raw: Bytes, one: Definition, heads: Index, rows: Index) -> MessageTab
 def _characters(one: Definition) -> dict[str, str]:
     """Format characters by field; of a name that stands there twice the first counts."""
     return dict(zip(reversed(one.fields), reversed(one.characters[: len(one.fields)]), strict=True))
-
-
-def merge(tables: Sequence[MessageTable]) -> MessageTable:
-    """Messages of one name whose columns differ, as one table: NaN or "" where one has no such field."""
-    if len(tables) == 1:
-        return tables[0]
-    characters = {name: kind for table in reversed(tables) for name, kind in table.characters.items()}
-    names = dict.fromkeys(name for table in tables for name in table.fields)
-    rows = np.concatenate([table.rows for table in tables])
-    order = np.argsort(rows, kind="stable")
-
-    def column(name: str) -> Any:
-        if characters[name] in NO_NUMBER:
-            parts = [np.array(table.texts(name) or [""] * len(table), object) for table in tables]
-        else:
-            parts = [table.get(name) for table in tables]
-        return np.concatenate(parts)[order]
-
-    return MessageTable(tables[0].name, Columns(names, column), rows[order], characters)
 
 
 # -- as text

@@ -11,21 +11,20 @@ camera's latitude, longitude and height above the ellipsoid, standard deviations
 state of the receiver. Facts of the format: DJI's user manuals.
 
 Rows of AirData's tables (CSV), in metres or in feet, carry a counter of milliseconds, and UTC in whole
-seconds beside it. The fraction comes from the rows where the second changes; the counter stands still while
-the record pauses, so that each stretch between pauses has a fit of its own.
+seconds beside it, which the fraction was cut off of. The counter stands still while the record pauses, so
+that each stretch between pauses has an offset of its own.
 """
 
 from __future__ import annotations
 
 import re
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from wildlab.errors import WildlabError
-from wildlab.flight.clock_fitting import WEEK_S, ClockFit, fit_clock, wall_to_utc, week_to_utc
+from wildlab.flight.clock_fitting import WEEK_S, wall_to_utc, week_to_utc
 from wildlab.flight.readers.log import (
     ANGLES,
     PLACE,
@@ -291,7 +290,7 @@ _COLUMNS = {
 }
 #: A gimbal that keeps its heading within this, while the aircraft turns by more than that, degrees.
 _STILL_DEG, _TURNED_DEG = 2.0, 45.0
-#: The counter and the clock part by more than this in a pause only, s; fewer changes of second make no fit.
+#: The counter and the clock part by more than this in a pause only, s; fewer rows are no stretch.
 _PAUSE_S, _FEW = 1.5, 10
 
 
@@ -395,34 +394,17 @@ def _unit(path: Path, ours: str, column: tuple[str, str]) -> float:
 
 
 def _fraction(own: Array, whole: Array, notes: list[str]) -> Array:
-    """Stamps in whole seconds made finer by a counter: where a second changes, it has just begun."""
-    both = np.flatnonzero(np.isfinite(own) & np.isfinite(whole))
-    if not np.isfinite(whole).any():
+    """Stamps in whole seconds made finer by a counter, which stands still between stretches."""
+    lack = pd.Series(whole - own)
+    if lack.isna().all() or (whole[np.isfinite(whole)] % 1 > 0).any():
         return whole
-    changes = np.flatnonzero(np.diff(whole[both]) > 0)
-    before, after = both[changes], both[changes + 1]
-    near = (own[after] > own[before]) & (own[after] - own[before] < 1.0)
-    before, after = before[near], after[near]
-    if len(after) < 3 or (whole[both] % 1 > 0).any():
-        return whole
-    reference, middle = whole[after], (own[before] + own[after]) / 2
-    # Nothing but a pause, or a wrong row, parts the two by more than the second that one of them is coarse.
-    lack = (whole - own)[both]
-    breaks = both[np.flatnonzero(np.abs(np.diff(lack)) > _PAUSE_S) + 1]
-    time = np.full(len(own), np.nan)
-    fits: list[ClockFit] = []
-    for begin, end in pairwise([0, *breaks.tolist(), len(own)]):
-        within = (before >= begin) & (after < end)
-        if within.sum() >= _FEW:
-            fits.append(fit_clock(middle[within], reference[within]))
-            time[begin:end] = fits[-1].to_reference(own[begin:end])
-        else:
-            # Too short to be fitted: half a second is cut off in the mean.
-            time[begin:end] = own[begin:end] + np.nanmedian((whole - own)[begin:end]) + 0.5
-    stood = [float(b.offset_s - a.offset_s) for a, b in pairwise(fits)]
-    if stood:
+    # Within a stretch the two differ by a constant, less the part of a second that was cut off.
+    stretches = lack.groupby((lack.ffill().diff().abs() > _PAUSE_S).cumsum())
+    constant = (stretches.max() + stretches.min() + 1.0) / 2.0
+    stood = constant.diff()[stretches.size() >= _FEW].dropna()
+    if len(stood):
         notes.append(
             f"the counter of milliseconds stood still {plural(len(stood), 'time')}, "
-            f"{sum(stood):.1f} s together: each stretch has its own fit"
+            f"{stood.sum():.1f} s together: each stretch has its own offset"
         )
-    return time
+    return own + constant[stretches.ngroup()].to_numpy()

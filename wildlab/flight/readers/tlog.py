@@ -353,15 +353,14 @@ def _systems(frames: Telemetry) -> tuple[list[tuple[int, int]], set[int]]:
     """(system, component) of the autopilots, the busiest first, and systems that are none."""
     beats = frames.of("HEARTBEAT")
     no = (beats.get("autopilot") == _NO_AUTOPILOT) | (beats.get("type") == _GROUND_STATION)
-    known, autopilots = set(_senders(beats)), set(_senders(beats.take(~no)))
-    counts: dict[tuple[int, int], tuple[int, ...]] = {}
-    for place, name in enumerate(_FLIES):
-        for one, count in Counter(_senders(frames.of(name))).items():
-            if one in autopilots or one not in known:
-                had = counts.get(one, (0,) * len(_FLIES))
-                counts[one] = (*had[:place], count, *had[place + 1 :])
+    autopilots = set(_senders(beats.take(~no)))
+    counts = [Counter(_senders(frames.of(name))) for name in _FLIES]
     # A heartbeat says more than none: without it a component may forward what others sent.
-    order = sorted(counts, key=lambda one: (one in autopilots, counts[one]), reverse=True)
+    order = sorted(
+        set().union(*counts) - (set(_senders(beats)) - autopilots),
+        key=lambda one: (one in autopilots, *(count[one] for count in counts)),
+        reverse=True,
+    )
     first: dict[int, tuple[int, int]] = {}
     for one in order:
         first.setdefault(one[0], one)

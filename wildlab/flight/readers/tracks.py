@@ -1,14 +1,14 @@
-"""Tracks of satellite receivers as `gnss`: NMEA 0183, u-blox UBX, GPX (1.0 and 1.1), RTKLIB's ``.pos``.
+"""Tracks of satellite receivers as `gnss`: NMEA 0183, u-blox UBX, GPX (1.0 and 1.1), RTKLIB's ``.pos``; and
+what the sensors of the Autoferry data set saw.
 
 Sentences of NMEA are found wherever they stand in a line, so that stamps of a logger before them do no harm.
 They are joined into epochs by the time that they carry; days come from RMC and ZDA, and are carried to the
 sentences that have none, over midnight too. Facts of the sentences: NMEA 0183, as `pynmea2` has it.
 
-Of UBX, NAV-PVT says all of a position; older receivers say it in NAV-POSLLH, NAV-VELNED and NAV-TIMEGPS or
-NAV-SOL of one time of week. Receivers with dead reckoning say HNR-PVT and HNR-ATT often: these are `poses`.
-UTC is the receiver's own; where it has none it comes from weeks and the table of leap seconds. Messages of a
-kind are taken all at once, some 50 times as fast as `pyubx2` makes an object of each. Facts of the protocol:
-u-blox interface descriptions of series 6 to 9, as `pyubx2` has them.
+Of UBX, NAV-PVT says all of a position. Receivers with dead reckoning say HNR-PVT and HNR-ATT often: these
+are `poses`. UTC is the receiver's own. Messages of a kind are taken all at once, some 50 times as fast as
+`pyubx2` makes an object of each. Facts of the protocol: u-blox interface descriptions of series 7 to 9, as
+`pyubx2` has them.
 
 Points of a damaged GPX are salvaged. Of RTKLIB, calendar dates or weeks with their time, in GPST or UTC,
 latitude and longitude in degrees; other solutions are refused, with what to set. Facts of the format:
@@ -24,7 +24,7 @@ from datetime import UTC, datetime
 from functools import reduce
 from operator import xor
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -32,7 +32,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.clock_fitting import GPS_START_S, WEEK_S, gps_to_utc, week_to_utc
+from wildlab.flight.clock_fitting import GPS_START_S, WEEK_S, gps_to_utc
 from wildlab.flight.readers import text
 from wildlab.flight.readers.log import (
     UTC_OF_LOG,
@@ -251,8 +251,7 @@ def _degrees(value: Array, side: pd.Series) -> Array:
 # -- u-blox UBX
 
 #: Class and number of messages.
-PVT, POSLLH, VELNED = (0x01, 0x07), (0x01, 0x02), (0x01, 0x12)
-TIMEGPS, SOL, DOP = (0x01, 0x20), (0x01, 0x06), (0x01, 0x04)
+PVT, DOP = (0x01, 0x07), (0x01, 0x04)
 NAV_ATT, HNR_ATT, HNR_PVT = (0x01, 0x05), (0x28, 0x01), (0x28, 0x00)
 #: Sync, class, number, length; then the payload and two bytes of checksum.
 _SYNC, _HEADER, _CHECK = (0xB5, 0x62), 6, 2
@@ -283,10 +282,6 @@ LAYOUTS: dict[tuple[int, int], Any] = {
     for kind, text in {
         PVT: f"itow:u4, {_DATE}, valid:u1, time_acc:u4, nano:i4, fix flags flags2 satellites:u1, {_PLACE}, "
         "h_acc v_acc:u4, vel_n vel_e vel_d speed course:i4, s_acc course_acc:u4, pdop:u2, flags3:u1",
-        POSLLH: f"itow:u4, {_PLACE}, h_acc v_acc:u4",
-        VELNED: "itow:u4, vel_n vel_e vel_d:i4, speed_3d speed:u4, course:i4, s_acc:u4",
-        TIMEGPS: "itow:u4, ftow:i4, week:i2, leap:i1, valid:u1",
-        SOL: "itow:u4, ftow:i4, week:i2, fix flags:u1, +35, satellites:u1",
         DOP: "itow:u4, +8, hdop:u2",
         NAV_ATT: _ATTITUDE,
         HNR_ATT: _ATTITUDE,
@@ -371,7 +366,7 @@ def ubx_decode(path: Path, data: bytes, zone: str | None) -> RawLog:
         Where no message has a position, nor any sentence of NMEA.
     """
     found = frames(data)
-    gnss = _of_pvt(found, PVT) or _of_old(found)
+    gnss = _of_pvt(found, PVT)
     if gnss is None:
         return nmea_decode(path, data, zone)
     poses = _poses(found, gnss)
@@ -430,37 +425,6 @@ def _of_pvt(found: UbxFrames, kind: tuple[int, int]) -> Stream | None:
     else:
         columns |= level_velocity(one["speed"] * 1e-3, one["course"] * 1e-5)
     return Stream(columns, one["which"], "message", reasons)
-
-
-def _of_old(found: UbxFrames) -> Stream | None:
-    rows = found.rows(POSLLH)
-    if not len(rows):
-        return None
-    own = rows["own_s"].to_numpy()
-    moving, status = found.at(own, VELNED), found.at(own, SOL)
-    fix, flags = status["fix"], status["flags"].fillna(1).astype(int)
-    kinds = fix.map(_FIXES).to_numpy()
-    columns = {
-        "time_s": _weeks_to_utc(found, own),
-        **_place(found, rows),
-        **{name: moving[f"vel_{name[2]}"].to_numpy() * 1e-2 for name in VELOCITY},
-        "sd_velocity_m_s": moving["s_acc"].to_numpy() * 1e-2,
-        "fix": kinds,
-        "satellites": status["satellites"].to_numpy(float),
-    }
-    return Stream(columns, rows["which"], "message", {"no fix": (flags & 1 == 0).to_numpy()})
-
-
-def _weeks_to_utc(found: UbxFrames, own: Array) -> Array:
-    """UTC of times of week, by the messages that know both."""
-    pairs = []
-    # Both bits: the week and the time in it; they stand at different places.
-    for kind, field, bits in ((TIMEGPS, "valid", 3), (SOL, "flags", 12)):
-        rows = found.rows(kind)
-        utc = week_to_utc(rows["week"], rows["itow"] * 1e-3 + rows["ftow"] * 1e-9)
-        pairs.append((rows["own_s"], np.where((rows[field] & bits) == bits, utc, np.nan)))
-    apart = (utc - stamps for stamps, utc in pairs)
-    return own + next((float(np.nanmedian(one)) for one in apart if np.isfinite(one).any()), np.nan)
 
 
 def _poses(found: UbxFrames, gnss: Stream) -> Stream | None:
@@ -670,3 +634,108 @@ def _time(row: list[str]) -> float:
     week, seconds = map(number, row[:2])
     fine = week.is_integer() and 0 <= seconds < WEEK_S and 0 <= week < 10000
     return GPS_START_S + week * WEEK_S + seconds if fine else np.nan
+
+
+# -- Autoferry
+
+#: Parts of the data set.
+Part = Literal["frames", "lidar", "radar", "ir", "eo", "truth"]
+
+#: `sensorID` as published, and what it stands for.
+SENSORS = {1: "lidar", 2: "radar", 3: "ir", 4: "eo"}
+CAMERAS = ("ir", "eo")
+#: The published files have up to 0.6 MB.
+MOST_BYTES = 64 << 20
+#: No coordinate of a ferry's surroundings is further from its origin, m.
+FURTHEST_M = 1e6
+
+
+def read_part(path: Path, data: bytes, part: Part) -> tuple[dict[str, NDArray[Any]], NDArray[np.int64]]:
+    """Columns of one part of a file, and for each row the number of the frame in the file, counted from 1.
+
+    A file of detections is a list of frames, each of one sensor at one time: where own ship was, and what the
+    sensor saw from there. Cameras saw bearings from north (radians); lidar and radar saw points, metres north
+    and east of own ship, as one list of norths and one of easts. MATLAB wrote it: a single bearing is a
+    number, a single point a pair, and nothing at all an empty list. A file of truth repeats, for every frame,
+    the last position of every target.
+
+    ``frames``: ``frame`` (its name, as ``lidar-0007``), ``sensor``, ``time`` (s since 1970), ``north`` and
+    ``east`` of own ship (m), in order of time. ``lidar``, ``radar``: ``frame``, ``north``, ``east`` of each
+    point in the local frame, own ship's position at the stamp added. ``ir``, ``eo``: ``frame``, ``bearing``
+    (rad). ``truth``: ``target``, ``time``, ``north``, ``east``, ``down``, each sample once, in order of
+    target and time.
+
+    Raises
+    ------
+    WildlabError
+        Naming file, frame and field: not JSON, too large, another structure, a number that is none.
+    """
+    content = text.parse_json(data, path) if len(data) <= MOST_BYTES else None
+    if not isinstance(content, list) or not content:
+        problem = f"is no list of frames of at most {MOST_BYTES >> 20} MiB"
+        raise WildlabError(problem, "copy the published file again", file=path)
+    return _truth(content, path) if part == "truth" else _detections(content, part, path)
+
+
+def _given(frame: Any, at: int, field: str, shape: Sequence[int], most: float, path: Path) -> Array:
+    """The numbers of one field of a frame in a shape, within bounds."""
+    try:
+        values = np.array(frame[field], float).reshape(shape)
+    except (KeyError, TypeError, ValueError, OverflowError):
+        values = np.array(np.nan)
+    if not (np.abs(values) <= most).all() or (field == "sensorID" and values.item() not in SENSORS):
+        problem = f"frame {at} has {str(frame)[:60]!r}, which is not as published"
+        raise WildlabError(problem, "copy the published file again", file=path, field=field)
+    return values
+
+
+def _detections(
+    content: list[Any], part: Part, path: Path
+) -> tuple[dict[str, NDArray[Any]], NDArray[np.int64]]:
+    rows, seen = [], []
+    for at, one in enumerate(content, 1):
+        sensor = SENSORS[int(_given(one, at, "sensorID", (), 4, path))]
+        time = float(_given(one, at, "time", (), 1e10, path))
+        own = _given(one, at, "ownshipPosition", (2,), FURTHEST_M, path)
+        shape, most = ((1, -1), 2 * np.pi) if sensor in CAMERAS else ((2, -1), FURTHEST_M)
+        measured = _given(one, at, "measurement", shape, most, path).T
+        seen.append(measured if sensor in CAMERAS else measured + own)
+        rows.append((sensor, time, *own))
+    table = pd.DataFrame(rows, columns=["sensor", "time", "north", "east"])
+    # Frames of one sensor come in order; those of several do not everywhere.
+    table = table.sort_values("time", kind="stable")
+    counted = table.groupby("sensor").cumcount() + 1
+    table["frame"] = table["sensor"] + counted.map("-{:04d}".format)
+    if part == "frames":
+        columns = {name: table[name].to_numpy() for name in ("frame", "sensor", "time", "north", "east")}
+        return columns, table.index.to_numpy() + 1
+    ours = table[table["sensor"] == part]
+    measures = ("bearing",) if part in CAMERAS else ("north", "east")
+    counts = [len(seen[at]) for at in ours.index]
+    values = np.concatenate([np.empty((0, len(measures))), *(seen[at] for at in ours.index)])
+    names = {"frame": np.repeat(ours["frame"].to_numpy(object), counts)}
+    return names | named(measures, values.T), np.repeat(ours.index.to_numpy(), counts) + 1
+
+
+def _truth(content: list[Any], path: Path) -> tuple[dict[str, NDArray[Any]], NDArray[np.int64]]:
+    names = ["target", "time", "north", "east", "down"]
+    table = pd.DataFrame(
+        [
+            (
+                str(int(_given(one, at, "targetID", (), 1000, path))),
+                float(_given(one, at, "time", (), 1e10, path)),
+                *_given(one, at, "position", (3,), FURTHEST_M, path),
+                at,
+            )
+            for at, frame in enumerate(content, 1)
+            for one in (frame if isinstance(frame, list) else [frame])
+        ],
+        columns=[*names, "row"],
+    )
+    table = table.drop_duplicates(names)
+    twice = table.duplicated(["target", "time"])
+    if twice.any():
+        problem = f"the target is elsewhere at the same time in frame {table['row'][twice].iloc[0]}"
+        raise WildlabError(problem, "copy the published file again", file=path, field="position")
+    table = table.sort_values(["target", "time"])
+    return {name: table[name].to_numpy() for name in names}, table["row"].to_numpy(np.int64)
