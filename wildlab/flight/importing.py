@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from datetime import UTC, datetime
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -41,7 +40,7 @@ from wildlab.flight.recipe_tables import (
     read_sensors,
     read_truth,
 )
-from wildlab.flight.recipes import Recipe, read_recipe
+from wildlab.flight.recipes import Block, Recipe, read_recipe
 from wildlab.flight.schema import POSITION
 from wildlab.flight.store import Flight, save_flight
 from wildlab.flight.terrain import lay_terrain
@@ -197,39 +196,27 @@ def _camera(recipe: Recipe, raw: RawFiles) -> CameraPart | None:
         Where a column is missing or does not hold one constant, or a number makes no camera; or the camera's
         own file is missing or wrong.
     """
-    if recipe.camera_file is not None:
-        raw.read(recipe.camera_file, "camera", TOML_LIMIT)
-        return read_camera(raw.folder / recipe.camera_file).camera
-    block = recipe.camera
-    if block is None:
+    if recipe.camera is None:
         return None
-    data: dict[str, object] = {name: getattr(block, name) for name in CameraPart.model_fields}
-    path = raw.recipe
-    if block.file is not None:
-        rows = raw.table(block.file, block.separator, "camera", decimal=block.decimal)
-        for name, column in block.columns.items():
+    if isinstance(recipe.camera, str):
+        raw.read(recipe.camera, "camera", TOML_LIMIT)
+        return read_camera(raw.folder / recipe.camera).camera
+    data, rows, columns = dict(recipe.camera), None, {}
+    if stated := {key: data.pop(key) for key in Block.model_fields if key in data}:
+        rows = raw.table(check_model(Block, stated, raw.recipe), "camera")
+        columns = {name: one for name, one in data.items() if isinstance(one, str) and name != "name"}
+        for name, column in columns.items():
             found = plain_numbers(rows, column, f"camera.{name}")
-            rows.refuse(
-                found != found[0],
-                partial(_camera_changes, found),
-                "import each camera or zoom by itself",
-                column,
-                f"camera.{name}",
-            )
+            fix = "import each camera or zoom by itself"
+            rows.refuse(found != found[0], "the camera changes", fix, column, f"camera.{name}")
             data[name] = float(found[0])
     try:
-        return check_model(CameraPart, data, path)
+        return check_model(CameraPart, data, raw.recipe)
     except WildlabError as error:
         name = error.field or ""
-        named = block.columns.get(name)
-        if named is None or block.file is None:
-            raise WildlabError(error.problem, error.fix, file=path, field=f"camera.{name}") from None
-        rows = raw.table(block.file, block.separator, "camera", decimal=block.decimal)
-        raise rows.fail(error.problem, error.fix, named, f"camera.{name}", 0) from None
-
-
-def _camera_changes(found: NDArray[np.float64], row: int) -> str:
-    return f"the camera changes: {found[row]:g} here, {found[0]:g} before"
+        if rows is None or name not in columns:
+            raise WildlabError(error.problem, error.fix, file=raw.recipe, field=f"camera.{name}") from None
+        raise rows.fail(error.problem, error.fix, columns[name], f"camera.{name}", 0) from None
 
 
 def _places(recipe: Recipe, poses: dict[str, Rows], sensors: dict[str, Rows]) -> LocalFrame:

@@ -12,11 +12,12 @@ import csv
 import hashlib
 import io
 import math
+import operator
 import re
 import struct
 import warnings
 import zlib
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from itertools import islice
@@ -25,10 +26,9 @@ from typing import Any, cast
 
 import numpy as np
 import pandas as pd
-import pyarrow
-import pyarrow.compute
 import scipy.io
 from numpy.typing import NDArray
+from pandas.api.types import is_numeric_dtype
 
 from wildlab.errors import WildlabError
 from wildlab.flight.clock_fitting import TriggerMatch, find_zone, match_triggers
@@ -37,20 +37,14 @@ from wildlab.flight.readers import FOLDERS, read_folder, read_log
 from wildlab.flight.readers.log import RawLog, Stream
 from wildlab.flight.readers.photos import of_camera
 from wildlab.flight.readers.tracks import Part, read_part
-from wildlab.flight.recipes import Decimal, LogTable, MatlabTable, Quantity, Series, Stamp
+from wildlab.flight.recipes import Block, Decimal, LogTable, MatlabTable, Quantity, Series, Stamp
 from wildlab.flight.schema import Dimension, factor
 
-_WHOLE = re.compile(r"[-+]?\d+", re.ASCII)
 #: Rows that are Python strings at a time.
 BLOCK = 50_000
 
-# pyarrow has no types that mypy could read.
-pa: Any = pyarrow
 
-
-def read_delimited(
-    path: Path, data: bytes, separator: str, *, may_be_empty: bool = False
-) -> tuple[tuple[str, ...], dict[str, Any], NDArray[np.int64]]:
+def read_delimited(path: Path, data: bytes, separator: str) -> tuple[pd.DataFrame, NDArray[np.int64]]:
     """A file of text whose first line has the names of the columns.
 
     Parameters
@@ -61,78 +55,43 @@ def read_delimited(
         What is in it.
     separator
         Between the cells of a row.
-    may_be_empty
-        Whether the names of the columns may be all there is, as where nothing was detected.
 
     Returns
     -------
     tuple
-        Names of the columns; the cells of each without blanks at both ends, packed (a pyarrow.ChunkedArray of
-        text, length N); and for each row the line it ends on, (N,).
+        Cells without blanks at both ends, as packed text; and for each row the line it ends on, (N,).
 
     Raises
     ------
     WildlabError
-        Where it is not UTF-8, has no rows, or a row has more or fewer cells than the first line.
+        Where it is not UTF-8, or a row has more or fewer cells than the first line.
     """
     text = io.TextIOWrapper(io.BytesIO(data), encoding="utf-8-sig", newline="")
     reader = csv.reader(text, delimiter=separator, skipinitialspace=True)
-    lines: list[NDArray[np.int64]] = []
     try:
-        header = tuple(name.strip() for name in next(reader, []))
-        packed: list[list[Any]] = [[] for _ in header]
-        for rows, ends in _blocks(reader, header, path):
-            lines.append(np.array(ends, np.int64))
-            for chunks, column in zip(packed, zip(*rows, strict=True), strict=True):
-                chunks.append(pyarrow.compute.utf8_trim_whitespace(pa.array(column, pa.string())))
+        header = [name.strip() for name in next(reader, [])]
+        blocks, lines = (
+            [pd.DataFrame(columns=range(len(header)), dtype="string[pyarrow]")],
+            [np.empty(0, int)],
+        )
+        numbered = ((row, reader.line_num) for row in reader if row)
+        while block := list(islice(numbered, BLOCK)):
+            for row, line in block:
+                if len(row) != len(header):
+                    problem = f"line {line} has {len(row)} cells, and the first line has {len(header)}"
+                    fix = "mend that line, the separator, or decimal commas"
+                    raise WildlabError(problem, fix, file=path)
+            rows, ends = zip(*block, strict=True)
+            blocks.append(pd.DataFrame(rows, dtype="string[pyarrow]").apply(lambda cells: cells.str.strip()))
+            lines.append(np.array(ends))
     except csv.Error as error:
         raise WildlabError(f"line {reader.line_num}: {error}", "mend that line", file=path) from None
     except UnicodeDecodeError:
-        line = data[: _first_undecodable(data)].count(b"\n") + 1
-        raise WildlabError(f"line {line} is not UTF-8 text", "save the file as UTF-8", file=path) from None
-    if not lines and not (may_be_empty and any(header)):
-        raise WildlabError("there are no rows in it", "add column names and rows", file=path)
-    cells = {name: pa.chunked_array(chunks, pa.string()) for name, chunks in zip(header, packed, strict=True)}
-    return header, cells, np.concatenate([np.empty(0, np.int64), *lines])
-
-
-def packed(words: Iterable[str]) -> Any:
-    """Text as a pyarrow.ChunkedArray."""
-    return pa.chunked_array([pa.array(words, pa.string())])
-
-
-def is_packed(column: Any) -> bool:
-    """Whether a column is packed text, and not an array of numbers."""
-    return isinstance(column, pa.ChunkedArray)
-
-
-def _blocks(reader: Any, header: tuple[str, ...], path: Path) -> Iterator[tuple[list[list[str]], list[int]]]:
-    """Rows that are not blank, with the line each ends on, a block at a time."""
-    numbered = ((row, reader.line_num) for row in reader if row)
-    while block := list(islice(numbered, BLOCK)):
-        for row, line in block:
-            if len(row) != len(header):
-                raise _uneven(row, line, header, path)
-        rows, ends = zip(*block, strict=True)
-        yield list(rows), list(ends)
-
-
-def _uneven(row: list[str], line: int, header: tuple[str, ...], path: Path) -> WildlabError:
-    """Of a row with more or fewer cells than there are columns, perhaps for its decimal commas."""
-    problem = f"line {line} has {len(row)} cells, and the first line has {len(header)}"
-    for name, whole, part in zip(header, row, row[1:], strict=False):
-        if len(row) > len(header) and _WHOLE.fullmatch(whole) and part.isdecimal():
-            problem += f": {whole},{part} is read as two cells: a decimal comma?"
-            return WildlabError(problem, "write it with a decimal point", file=path, field=name)
-    return WildlabError(problem, "mend that line, or the separator", file=path)
-
-
-def _first_undecodable(data: bytes) -> int:
-    try:
-        data.decode("utf-8")
-    except UnicodeDecodeError as error:
-        return error.start
-    return len(data)
+        before = re.split("[\udc80-\udcff]", data.decode("utf-8", "surrogateescape"), maxsplit=1)[0]
+        problem = f"line {before.count(chr(10)) + 1} is not UTF-8 text"
+        raise WildlabError(problem, "save the file as UTF-8", file=path) from None
+    cells = pd.concat(blocks, ignore_index=True)
+    return cells.set_axis(header, axis=1), np.concatenate(lines)
 
 
 # -- MATLAB
@@ -298,12 +257,11 @@ _LATEST_S = 9.2e9
 
 @dataclass(frozen=True)
 class RawTable:
-    """One table: its columns, packed text (`read_delimited`) or (from a MATLAB file) arrays, and for each row
+    """One table: its columns, of text or (from a MATLAB file or a log) of numbers too, and for each row
     the line it ends on, or its number."""
 
     path: Path
-    header: tuple[str, ...]
-    cells: dict[str, Any]
+    cells: pd.DataFrame
     lines: NDArray[np.int64]
     counted_in: str = "line"
     decimal: Decimal = "."
@@ -313,16 +271,11 @@ class RawTable:
 
     def rows(self, chosen: NDArray[np.intp]) -> RawTable:
         """Some of the rows."""
-        cells = {
-            name: column.take(pyarrow.array(chosen)) if is_packed(column) else column[chosen]
-            for name, column in self.cells.items()
-        }
-        return replace(self, cells=cells, lines=self.lines[chosen])
+        return replace(self, cells=self.cells.iloc[chosen], lines=self.lines[chosen])
 
     def cell(self, column: str, row: int) -> str:
         """One cell as text."""
-        found = self.cells[column][row]
-        return str(found.as_py() if is_packed(self.cells[column]) else found)
+        return str(self.cells[column].iloc[row])
 
     def fail(self, problem: str, fix: str, column: str, part: str, row: int | None = None) -> WildlabError:
         """An error about this table, to be raised."""
@@ -338,8 +291,8 @@ class RawTable:
             raise self.fail(problem if isinstance(problem, str) else problem(row), fix, column, part, row)
 
 
-#: Of a table that is no text: its file, columns, where each row stands, and what that counts.
-_Cells = tuple[Path, dict[str, Any], NDArray[np.int64], str]
+#: Limits of a condition, and what has to hold of a number and that.
+_LIMITS = {"equals": operator.eq, "differs": operator.ne, "above": operator.gt, "below": operator.lt}
 
 
 @dataclass
@@ -376,9 +329,7 @@ class RawFiles:
         self.hashes[name] = hashlib.sha256(data).hexdigest()
         return data
 
-    def table(
-        self, name: str, separator: str, part: str, *, may_be_empty: bool = False, decimal: Decimal = "."
-    ) -> RawTable:
+    def table(self, block: Block, part: str, *, may_be_empty: bool = False) -> RawTable:
         """A file as a table of text, its first line the names of the columns (and all there is, where it may
         be empty); or one of the tables that the recipe makes of MATLAB files and logs.
 
@@ -388,41 +339,41 @@ class RawFiles:
             Where it cannot be read, is not UTF-8, is empty, or a row has more or fewer cells than the first;
             or where it is no MATLAB file or log of that format, or does not hold what the recipe says.
         """
-        stated = self._of_log if name in self.logs else self._of_matlab if name in self.matlab else None
-        key = (name,) if stated else (name, separator, decimal)
+        key = (block.file, block.separator, block.decimal)
         if key not in self._tables:
-            if stated is not None:
-                path, cells, rows, counted_in = stated(name)
-                self._tables[key] = RawTable(path, tuple(cells), cells, rows, counted_in)
-                return self._tables[key]
-            path = self.folder / name
-            found = read_delimited(path, self.read(name, part), separator, may_be_empty=may_be_empty)
-            table = RawTable(path, *found, decimal=decimal)
-            if not len(table):
-                return table  # kept, it would pass where rows are asked for
-            self._tables[key] = table
-        return self._tables[key]
+            if block.file in self.logs:
+                self._tables[key] = self._of_log(block.file)
+            elif block.file in self.matlab:
+                self._tables[key] = self._of_matlab(block.file)
+            else:
+                path = self.folder / block.file
+                found = read_delimited(path, self.read(block.file, part), block.separator)
+                self._tables[key] = RawTable(path, *found, decimal=block.decimal)
+        table = self._tables[key]
+        if not len(table) and not (may_be_empty and any(table.cells.columns)):
+            raise WildlabError("there are no rows in it", "add column names and rows", file=table.path)
+        return table
 
-    def _of_matlab(self, name: str) -> _Cells:
+    def _of_matlab(self, name: str) -> RawTable:
         block, part = self.matlab[name], f"tables.{name}"
         path = self.folder / block.file
         if block.file not in self._variables:
             self._variables[block.file] = read_matlab(path, self.read(block.file, part))
-        cells = table_of(self._variables[block.file], block, path, part)
-        return path, cells, np.arange(1, len(next(iter(cells.values()))) + 1), "row"
+        cells = pd.DataFrame(table_of(self._variables[block.file], block, path, part))
+        return RawTable(path, cells, np.arange(1, len(cells) + 1), "row")
 
-    def _of_log(self, name: str) -> _Cells:
+    def _of_log(self, name: str) -> RawTable:
         block = self.logs[name]
         path = self.folder / block.file
         if block.format == "autoferry":
             cells, frames = read_part(path, self.read(block.file, f"logs.{name}"), cast(Part, block.part))
-            return path, cells, frames, "frame"
+            return RawTable(path, pd.DataFrame(cells), frames, "frame")
         stream = log_part(self._log(block, f"logs.{name}"), block, path)
         if block.triggers is not None:
             stream = stamped_by(stream, self._other(block.triggers, f"{name}.triggers", False), path)
         if block.images is not None:
             stream = of_images(stream, self._other(block.images, f"{name}.images", True))
-        return path, stream.columns, stream.rows, stream.counted_in
+        return RawTable(path, pd.DataFrame(stream.columns), stream.rows, stream.counted_in)
 
     def _other(self, name: str, asked: str, photos: bool) -> Stream:
         """Another log of the recipe: triggers that images have their times from, or the images of pixels."""
@@ -432,8 +383,9 @@ class RawFiles:
             fix = did_you_mean(name, self.logs)
             raise WildlabError(problem, fix, file=self.recipe, field=f"logs.{asked}")
         if photos:
-            table = self.table(name, "", asked)
-            return Stream(table.cells, table.lines, table.counted_in)
+            table = self.table(Block(file=name), asked)
+            columns = {str(key): column.to_numpy() for key, column in table.cells.items()}
+            return Stream(columns, table.lines, table.counted_in)
         return log_part(self._log(other, f"logs.{name}"), other, self.folder / other.file)
 
     def _log(self, block: LogTable, part: str) -> RawLog:
@@ -455,9 +407,7 @@ class RawFiles:
         WildlabError
             As `table`; and where a column of a condition is missing or not of numbers, or no row counts.
         """
-        table = self.table(
-            block.file, block.separator, part, may_be_empty=may_be_empty, decimal=block.decimal
-        )
+        table = self.table(block, part, may_be_empty=may_be_empty)
         if not len(table) or (not block.changed and not block.where):
             return table
         counts = np.ones(len(table), bool)
@@ -466,14 +416,9 @@ class RawFiles:
             counts[1:] = np.any([column[1:] != column[:-1] for column in columns], axis=0)
         for i, one in enumerate(block.where):
             value = plain_numbers(table, one.column, f"{part}.where[{i}]", may_be_empty=True)
-            if one.equals is not None:
-                counts &= value == one.equals
-            if one.differs is not None:
-                counts &= (value != one.differs) & ~np.isnan(value)
-            if one.above is not None:
-                counts &= value > one.above
-            if one.below is not None:
-                counts &= value < one.below
+            for name, holds in _LIMITS.items():
+                if (limit := getattr(one, name)) is not None:
+                    counts &= holds(value, limit) & ~np.isnan(value)
         if not counts.any():
             problem = f"none of the {len(table)} rows counts"
             columns_named = ", ".join([*block.changed, *(one.column for one in block.where)])
@@ -490,26 +435,24 @@ def texts(table: RawTable, column: str, part: str, *, may_be_empty: bool = False
         Where there is no such column, or a cell is empty that may not be.
     """
     found = _column(table, column, part)
-    if is_packed(found):
-        cells = np.asarray(found.to_numpy(), dtype=object)
-    else:  # numbers, as a name or a label: without a needless fraction
+    cells = found.to_numpy(dtype=object)
+    if is_numeric_dtype(found):  # as a name or a label: without a needless fraction
         cells = np.array(["" if np.isnan(one) else f"{one:.15g}" for one in found], dtype=object)
     if not may_be_empty:
         table.refuse(cells == "", *_EMPTY, column, part)
     return cells
 
 
-def _column(table: RawTable, column: str, part: str) -> Any:
-    """A column as it is kept: packed text, or an array of numbers."""
-    if column not in table.header:
-        fix = did_you_mean(column, table.header)
-        if len(table.header) == 1:
+def _column(table: RawTable, column: str, part: str) -> pd.Series:
+    header = [str(one) for one in table.cells.columns]
+    if column not in header:
+        fix = did_you_mean(column, header)
+        if len(header) == 1:
             fix = "the first line is a single name: check the separator"
         raise table.fail("this column is missing", fix, column, part)
-    if table.header.count(column) > 1:
+    if header.count(column) > 1:
         raise table.fail("two columns have this name", "rename one of them", column, part)
-    found = table.cells[column]
-    return packed(found) if not is_packed(found) and found.dtype == object else found
+    return table.cells[column]
 
 
 #: Problem and remedy.
@@ -568,22 +511,19 @@ def plain_numbers(table: RawTable, column: str, part: str, *, may_be_empty: bool
         Where there is no such column, or a cell is not a finite number.
     """
     cells = _column(table, column, part)
-    if is_packed(cells):
-        found, empty = np.empty(len(table)), np.empty(len(table), bool)
-        start = 0
-        for chunk in cells.iterchunks():  # a block at a time are Python's own strings
-            block = slice(start, start := start + len(chunk))
-            words = pd.Series(chunk.to_numpy(zero_copy_only=False))
+    if is_numeric_dtype(cells):
+        found = cells.to_numpy(float)
+        empty = np.isnan(found)
+    else:
+        found, empty = np.empty(len(cells)), (cells == "").to_numpy(bool)
+        for rows in np.array_split(np.arange(len(cells)), len(cells) // BLOCK + 1):
+            words = cells.iloc[rows].astype(object)
             if table.decimal == ",":
                 words = words.str.translate(_POINTS)
-            found[block] = pd.to_numeric(words, errors="coerce").to_numpy(dtype=float)
-            empty[block] = words == ""
-        if not may_be_empty:
-            table.refuse(empty, *_EMPTY, column, part)
-        bad = ~np.isfinite(found) & ~empty
-    else:
-        found = np.asarray(cells, float)
-        bad = np.isinf(found) if may_be_empty else ~np.isfinite(found)
+            found[rows] = pd.to_numeric(words, errors="coerce").to_numpy(dtype=float)
+    if not may_be_empty:
+        table.refuse(empty, *_EMPTY, column, part)
+    bad = ~np.isfinite(found) & ~empty
     if bad.any():
         row = int(np.argmax(bad))
         cell = table.cell(column, row)

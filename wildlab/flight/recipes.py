@@ -16,7 +16,6 @@ from wildlab.errors import WildlabError
 from wildlab.flight.clock_fitting import find_zone
 from wildlab.flight.files import Below, SafeName, Strict, check_model, did_you_mean, read_toml
 from wildlab.flight.manifest import (
-    CameraPart,
     ClocksPart,
     GnssPart,
     ImuPart,
@@ -549,43 +548,6 @@ class Poses(Series):
     )
 
 
-Number = float | str
-
-
-class RecipeCamera(Strict):
-    """As in the manifest; a text instead of a number names a column of `file` that holds one constant."""
-
-    name: str
-    file: str | None = None
-    separator: Separator = ","
-    decimal: Decimal = "."
-    width_px: Number
-    height_px: Number
-    fx_px: Number
-    fy_px: Number
-    cx_px: Number
-    cy_px: Number
-    skew_px: Number = 0.0
-    k1: Number = 0.0
-    k2: Number = 0.0
-    p1: Number = 0.0
-    p2: Number = 0.0
-    k3: Number = 0.0
-
-    @model_validator(mode="after")
-    def _file(self) -> Self:
-        if self.columns and self.file is None:
-            column = next(iter(self.columns))
-            raise ValueError(f"{column} names a column; add its file, or give a number")
-        return self
-
-    @property
-    def columns(self) -> dict[str, str]:
-        """Those of the numbers that stand in a column: name of the number -> name of the column."""
-        numbers = [name for name in CameraPart.model_fields if name != "name"]
-        return {name: value for name in numbers if isinstance(value := getattr(self, name), str)}
-
-
 class RecipeTime(Strict):
     """As in the manifest; without an epoch, it is the first whole second. `zone` is of stamps without one."""
 
@@ -631,8 +593,7 @@ class Recipe(Strict):
     locations: LocationsPart = LocationsPart()
     origin: OriginPart | None = None
     platform: PlatformPart
-    camera: RecipeCamera | None = None
-    camera_file: str | None = None
+    camera: dict[str, Any] | str | None = None
     mount: MountPart = MountPart()
     time: RecipeTime
     clocks: ClocksPart = ClocksPart()
@@ -660,21 +621,6 @@ class Recipe(Strict):
         every = {"imu": self.imu, "gnss": self.gnss, "magnetometer": self.magnetometer, "gimbal": self.gimbal}
         return {name: one for name, one in every.items() if one is not None}
 
-    @model_validator(mode="before")
-    @classmethod
-    def _camera_by_name(cls, data: Any) -> Any:
-        if isinstance(data, dict) and "camera_file" in data:
-            raise ValueError('there is no key camera_file; write camera = "camera.toml"')
-        if isinstance(data, dict) and isinstance(data.get("camera"), str):
-            rest = {key: value for key, value in data.items() if key != "camera"}
-            return {**rest, "camera_file": data["camera"]}
-        return data
-
-    @property
-    def has_camera(self) -> bool:
-        """Whether there is a camera, here or in a file of its own."""
-        return self.camera is not None or self.camera_file is not None
-
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         for problem in self._contradictions():
@@ -694,7 +640,7 @@ class Recipe(Strict):
         if not poses and self.gnss is None:
             yield "there are no poses; add [poses.autopilot], or at least [gnss]"
         images = frames is not None and frames.sensor is None
-        if not self.has_camera and (images or any(one.pixel for one in self.detections)):
+        if self.camera is None and (images or any(one.pixel for one in self.detections)):
             yield "there are images, and no camera; add [camera]"
         times = {} if frames is None else {"frames": frames.time}
         over_time: dict[str, Any] = {**self.on_board, **poses, **truth}

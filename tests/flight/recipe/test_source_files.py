@@ -5,13 +5,14 @@ import io
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from wildlab.errors import WildlabError
 from wildlab.flight import raw_files as raw
-from wildlab.flight.raw_files import RawTable, numbers, packed, plain_numbers, read_delimited, texts
+from wildlab.flight.raw_files import RawTable, numbers, plain_numbers, read_delimited, texts
 from wildlab.flight.recipes import Quantity
 
 CELLS = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=6)
@@ -27,13 +28,11 @@ def test_blocks_and_whole_say_the_same(rows, block):
     expected = [([cell.strip() for cell in row], reader.line_num) for row in reader][1:]
     before, raw.BLOCK = raw.BLOCK, block
     try:
-        header, cells, lines = read_delimited(Path("t.csv"), text.encode(), ",")
+        cells, lines = read_delimited(Path("t.csv"), text.encode(), ",")
     finally:
         raw.BLOCK = before
-    assert header == ("a", "b", "c")
-    assert [list(row) for row in zip(*(cells[name].to_pylist() for name in header), strict=True)] == [
-        row for row, _ in expected
-    ]
+    assert list(cells) == ["a", "b", "c"]
+    assert cells.to_numpy(dtype=object).tolist() == [row for row, _ in expected]
     assert lines.tolist() == [line for _, line in expected]
 
 
@@ -59,13 +58,9 @@ def test_the_line_of_a_wrong_byte_far_into_the_file():
         read_delimited(Path("t.csv"), data, ",")
 
 
-def test_text_out_of_other_files_is_packed_alike():
-    assert packed(np.array(["a", ""], dtype=object)).to_pylist() == ["a", ""]
-
-
 def angles(part: str, values: list[float], unit: str = "rad") -> np.ndarray:
     column = np.array(values)
-    table = RawTable(Path("log.csv"), ("a",), {"a": column}, np.arange(2, 2 + len(column)))
+    table = RawTable(Path("log.csv"), pd.DataFrame({"a": column}), np.arange(2, 2 + len(column)))
     return numbers(table, Quantity(column="a", unit=unit), "angle", part, may_be_empty=True)
 
 
