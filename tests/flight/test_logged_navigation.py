@@ -78,7 +78,7 @@ def _gyro_fits(flight: Flight, begin: float, end: float) -> np.ndarray:
     nav = nav[nav["time_s"].between(begin, end)].iloc[::10]
     t, R = nav["time_s"].to_numpy(), Rotation.from_quat(nav[QUATERNION].to_numpy(), scalar_first=True)
     turned = (R[:-1].inv() * R[1:]).as_rotvec() / np.diff(t)[:, None]
-    rate = inertial_samples(flight).mean_rate(t[:-1], t[1:])
+    rate = inertial_samples(flight).mean(RATE, t[:-1], t[1:])
     good = np.isfinite(rate).all(axis=1)
     return np.array([np.corrcoef(rate[good, i], turned[good, i])[0, 1] for i in range(3)])
 

@@ -252,7 +252,7 @@ def terrain(flight: Path, map_: Path, **stated: Any) -> None:
       wildlab terrain flights/tuesday dem.tif --heights 46.2
       wildlab terrain flights/tuesday map.png --crs EPSG:3006 --cell 2 --corner 571000 6502000 --heights 25
     """
-    from wildlab.flight.checks.camera import terrain_sentence
+    from wildlab.flight.checks.sensors import terrain_sentence
     from wildlab.flight.store import load_flight, save_flight
     from wildlab.flight.terrain import lay_terrain
 

@@ -495,16 +495,8 @@ class Proposal:
                 found["note"] = (
                     f"{' and '.join(stated).capitalize()}: as the receiver states. The rest: " + found["note"]
                 )
-            said = (
-                f"Assumed: pixels to {found['pixel_px']:g} px, tilt to "
-                f"{found['tilt_deg']:g} deg, heading to {found['heading_deg']:g} deg"
-            )
-            if "position horizontal" not in stated:
-                level, height = found["position_horizontal_m"], found["position_vertical_m"]
-                said += f", positions to {level:g} m ({height:g} m in height)"
-            said += ": see [uncertainty]."
             self.data["uncertainty"] = found | self.data.get("uncertainty", {})
-            self.notes.append(said)
+            self.notes.append("Standard deviations that no log states are assumed: see [uncertainty].")
         if "imu" in self.data:
             self.notes.append("[imu] assumes a typical sensor.")
 

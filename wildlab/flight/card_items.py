@@ -30,10 +30,8 @@ from wildlab.flight.readers.frames.image import SUFFIXES
 from wildlab.flight.readers.log import RawLog, Stream
 from wildlab.flight.readers.photos import camera_of, of_camera
 from wildlab.flight.readers.text import header_of
-from wildlab.geometry.frames import geodetic_to_ned
+from wildlab.geometry.frames import Array, geodetic_to_ned
 from wildlab.names import listed
-
-Array = NDArray[np.float64]
 
 #: Endings of images, in small letters.
 IMAGES = frozenset(SUFFIXES)
@@ -791,7 +789,7 @@ def _by_triggers(photos: Stream, name: str, triggers: Stream) -> ImageClock | No
     )
 
 
-def _known(column: NDArray[Any] | None) -> NDArray[np.float64]:
+def _known(column: NDArray[Any] | None) -> Array:
     if column is None:
         return np.empty(0)
     values = np.asarray(column, float)

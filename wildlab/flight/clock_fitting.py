@@ -10,14 +10,14 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import linprog
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import min_weight_full_bipartite_matching
 
 from wildlab.errors import WildlabError
+from wildlab.geometry.frames import Array, Indices, Mask
 
-Array = NDArray[np.float64]
 #: First and last stamp, s.
 Span = tuple[float, float]
 
@@ -47,7 +47,7 @@ class ClockFit(NamedTuple):
     own_0: float
     reference_0: float
     rate: float
-    used: NDArray[np.bool_]
+    used: Mask
     rate_sd: float = np.inf
 
     def to_reference(self, own: ArrayLike) -> Array:
@@ -165,7 +165,7 @@ def _under(dx: Array, dy: Array, at_0: float, rate: float) -> _Line:
 
 
 #: Height at zero, slope, the points that it rests on, and the standard deviation of the slope.
-_Line = tuple[float, float, NDArray[np.bool_], float]
+_Line = tuple[float, float, Mask, float]
 
 
 def _scale(left: Array) -> float:
@@ -278,8 +278,6 @@ def lower_line(x: Array, y: Array) -> tuple[float, float, float]:
     return float(at_0), float(slope), 2.3 * float(spacing) / float(np.std(x))
 
 
-Index = NDArray[np.intp]
-
 #: Stamps of images may count in steps of so many seconds.
 RESOLUTIONS = (1.0, 0.1, 0.01)
 #: How far an image may be from its trigger (s) beside the step of its stamps, and what share of the time
@@ -309,7 +307,7 @@ class TriggerMatch(NamedTuple):
         many offsets.
     """
 
-    trigger: Index
+    trigger: Indices
     images_left: int
     triggers_left: int
     certain: bool
@@ -355,7 +353,7 @@ def match_triggers(image_stamps: ArrayLike, trigger_times: ArrayLike) -> Trigger
     apart = np.diff(t)
     usual = float(np.median(apart[apart > 0])) if (apart > 0).any() else np.inf
     near = max(_resolution(s), min(NEAR_S, SHARE * usual))
-    best: list[tuple[float, Index]] = []
+    best: list[tuple[float, Indices]] = []
     for offset in _offsets(s, t, near):
         score, pairs = _settle(s, t, offset, near)
         if not any(np.array_equal(pairs, other) for _, other in best):
@@ -395,7 +393,7 @@ def _offsets(s: Array, t: Array, near: float) -> list[float]:
     return found
 
 
-def _settle(s: Array, t: Array, offset: float, near: float) -> tuple[float, Index]:
+def _settle(s: Array, t: Array, offset: float, near: float) -> tuple[float, Indices]:
     """How much the pairs near an offset explain, and these, (K, 2)."""
     at, pairs = s + offset, np.zeros((0, 2), np.intp)
     for _ in range(4):
@@ -414,7 +412,7 @@ def _settle(s: Array, t: Array, offset: float, near: float) -> tuple[float, Inde
     return len(pairs) * float(np.log(np.e * near / spread)), pairs
 
 
-def _pair(at: Array, t: Array, near: float) -> Index:
+def _pair(at: Array, t: Array, near: float) -> Indices:
     """Pairs (K, 2) in order of time, no further apart than `near`, most and nearest first."""
     low, high = np.searchsorted(t, at - near), np.searchsorted(t, at + near, side="right")
     image = np.repeat(np.arange(len(at)), high - low)
@@ -511,7 +509,7 @@ def find_zone(text: str, field: str = "zone") -> tzinfo:
         ) from None
 
 
-def wall_to_utc(wall_s: ArrayLike, zone: str) -> NDArray[np.float64]:
+def wall_to_utc(wall_s: ArrayLike, zone: str) -> Array:
     """UTC of wall clocks, s since 1970.
 
     Parameters

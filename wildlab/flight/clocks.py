@@ -9,15 +9,13 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError
 from wildlab.flight.schema import COVARIANCE_COLUMNS, POSITION, QUATERNION
 from wildlab.flight.store import Flight
-from wildlab.geometry.frames import quaternion_to_matrix
+from wildlab.geometry.frames import Array, Indices, quaternion_to_matrix
 from wildlab.geometry.turns import between_attitudes
-
-Array = NDArray[np.float64]
 
 #: Stretches without a sample up to this long are bridged by interpolation, unless the caller says otherwise;
 #: longer ones where the log's own rate explains them, up to so many of its usual steps: none is missing.
@@ -363,9 +361,7 @@ def _longest(stamps: Array, what: str, max_gap_s: float | None = None) -> float:
     return longest_gap(stamps) if max_gap_s is None else max_gap_s
 
 
-def _rows_about(
-    stamps: Array, times: ArrayLike, longest: float
-) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
+def _rows_about(stamps: Array, times: ArrayLike, longest: float) -> tuple[Indices, Indices, Array]:
     """Rows before and after each time, and how far between them (0..1); NaN where there is no answer."""
     at = np.atleast_1d(np.asarray(times, float))
     after = np.clip(np.searchsorted(stamps, at, side="left"), 0, len(stamps) - 1)
@@ -377,6 +373,6 @@ def _rows_about(
     return before, after, np.where(exact | (inside & (span <= longest)), share, np.nan)
 
 
-def _between(values: Array, before: NDArray[np.intp], after: NDArray[np.intp], share: Array) -> Array:
+def _between(values: Array, before: Indices, after: Indices, share: Array) -> Array:
     # A time that falls on a stamp takes that row alone, whatever stands in the next.
     return values[before] + share[:, None] * (values[after] - values[before])

@@ -6,13 +6,11 @@ from collections.abc import Collection, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.log import Stream
+from wildlab.geometry.frames import Array
 from wildlab.names import listed
-
-Array = NDArray[np.float64]
 
 #: Heights above the geoid of EGM96, and what to do where PROJ's grid of it is not there.
 EGM96 = "EPSG:4326+5773"
@@ -243,19 +241,15 @@ def _first_fix(home: Stream, fixes: Stream, fixed: str) -> float | None:
     """Height of the fix minus that above take-off, at the first used fix that both know."""
     above = np.where(home.used, _of(home, "height_home_m"), np.nan)
     height = np.where(fixes.used, _of(fixes, fixed), np.nan)
-    if home is fixes:
-        both = np.flatnonzero(np.isfinite(above) & np.isfinite(height))
-        return float(height[both[0]] - above[both[0]]) if len(both) else None
-    for clock in ("time_s", "time_log_s"):
-        if clock not in home.columns or clock not in fixes.columns:
-            continue
-        own, other = _of(home, clock), _of(fixes, clock)
-        known = np.isfinite(own) & np.isfinite(above)
-        if not known.any():
-            continue
-        order = np.argsort(own[known], kind="stable")
-        t, h = own[known][order], above[known][order]
-        good = np.flatnonzero(np.isfinite(other) & np.isfinite(height) & (other >= t[0]) & (other <= t[-1]))
-        if len(good):
-            return float(height[good[0]] - np.interp(other[good[0]], t, h))
-    return None
+    if home is not fixes:
+        clocks = [
+            one for one in ("time_s", "time_log_s") if {one} <= home.columns.keys() & fixes.columns.keys()
+        ]
+        clock = next((one for one in clocks if np.isfinite(_of(home, one)[home.used]).any()), None)
+        if clock is None:
+            return None
+        known = np.isfinite(above) & np.isfinite(_of(home, clock))
+        stamps = _of(home, clock)[known]
+        above = np.interp(_of(fixes, clock), stamps, above[known], left=np.nan, right=np.nan)
+    both = np.flatnonzero(np.isfinite(above) & np.isfinite(height))
+    return float(height[both[0]] - above[both[0]]) if len(both) else None

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from pydantic import BaseModel
 
 from wildlab.errors import WildlabError
@@ -44,6 +43,7 @@ from wildlab.flight.recipes import Block, Recipe, read_recipe
 from wildlab.flight.schema import POSITION
 from wildlab.flight.store import Flight, save_flight
 from wildlab.flight.terrain import lay_terrain
+from wildlab.geometry.frames import Array
 
 #: Parts that a manifest has as the recipe states them.
 _AS_STATED = (
@@ -236,9 +236,7 @@ def _places(recipe: Recipe, poses: dict[str, Rows], sensors: dict[str, Rows]) ->
     return LocalFrame(origin, vertical.correction_m, vertical.taken_off)
 
 
-def _positions_of_receiver(
-    recipe: Recipe, tables: dict[str, pd.DataFrame], times: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _positions_of_receiver(recipe: Recipe, tables: dict[str, pd.DataFrame], times: Array) -> Array:
     """Where the receiver was, (N, 3), for poses without positions of their own."""
     if recipe.gnss is None:
         raise ValueError("poses without positions")
@@ -264,7 +262,7 @@ def _pose_times(
     recipe: Recipe,
     raw: RawFiles,
     name: str,
-) -> NDArray[np.float64]:
+) -> Array:
     """Flight time of each pose: its own stamp, or that of its frame."""
     if poses.stamps is not None:
         return np.asarray((poses.stamps - start) / 1e9)

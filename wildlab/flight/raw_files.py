@@ -39,12 +39,13 @@ from wildlab.flight.readers.photos import of_camera
 from wildlab.flight.readers.tracks import Part, read_part
 from wildlab.flight.recipes import Block, Decimal, LogTable, MatlabTable, Quantity, Series, Stamp
 from wildlab.flight.schema import Dimension, factor
+from wildlab.geometry.frames import Array, Indices, Mask
 
 #: Rows that are Python strings at a time.
 BLOCK = 50_000
 
 
-def read_delimited(path: Path, data: bytes, separator: str) -> tuple[pd.DataFrame, NDArray[np.int64]]:
+def read_delimited(path: Path, data: bytes, separator: str) -> tuple[pd.DataFrame, Indices]:
     """A file of text whose first line has the names of the columns.
 
     Parameters
@@ -240,9 +241,8 @@ def _matlab_column(value: Any, name: str, path: Path, part: str) -> NDArray[Any]
     )
 
 
-Array = NDArray[np.float64]
 Text = NDArray[np.object_]
-Nanoseconds = NDArray[np.int64]
+Nanoseconds = Indices
 
 #: Decimal commas as points; beside them, a point would part thousands, and is no number.
 _POINTS = {ord(","): ".", ord("."): "?"}
@@ -262,14 +262,14 @@ class RawTable:
 
     path: Path
     cells: pd.DataFrame
-    lines: NDArray[np.int64]
+    lines: Indices
     counted_in: str = "line"
     decimal: Decimal = "."
 
     def __len__(self) -> int:
         return len(self.lines)
 
-    def rows(self, chosen: NDArray[np.intp]) -> RawTable:
+    def rows(self, chosen: Indices) -> RawTable:
         """Some of the rows."""
         return replace(self, cells=self.cells.iloc[chosen], lines=self.lines[chosen])
 
@@ -283,7 +283,7 @@ class RawTable:
         return WildlabError(where + problem, fix, file=self.path, field=f"{printable(column)} (in [{part}])")
 
     def refuse(
-        self, bad: NDArray[np.bool_], problem: str | Callable[[int], str], fix: str, column: str, part: str
+        self, bad: Mask, problem: str | Callable[[int], str], fix: str, column: str, part: str
     ) -> None:
         """Raise about the first of the rows (N,) that are bad, where there is one."""
         if bad.any():
@@ -550,7 +550,7 @@ def times(table: RawTable, stamp: Stamp, part: str, zone: str | None, epoch: dat
     columns = [texts(table, column, part) for column in stamp.names]
     cells = np.array([" ".join(parts) for parts in zip(*columns, strict=True)], dtype=object)
 
-    def refuse(lost: NDArray[np.bool_], problem: str, fix: str) -> None:
+    def refuse(lost: Mask, problem: str, fix: str) -> None:
         table.refuse(lost, lambda row: problem.replace("{}", _short(cells[row]), 1), fix, name, part)
 
     own = "%z" in stamp.format

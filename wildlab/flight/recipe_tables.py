@@ -8,14 +8,12 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from wildlab.flight.checks.findings import (
     NORM_TOLERANCE,
 )
 from wildlab.flight.clocks import covariance_columns
 from wildlab.flight.raw_files import (
-    Array,
     Nanoseconds,
     RawFiles,
     RawTable,
@@ -47,6 +45,9 @@ from wildlab.flight.schema import POSITION, QUATERNION, VELOCITY, Dimension
 from wildlab.geometry.attitude_uncertainty import pose_covariance, tilt_from_roll_pitch
 from wildlab.geometry.frames import (
     R_NED_ENU,
+    Array,
+    Indices,
+    Mask,
     Origin,
     enu_to_ned,
     euler_to_matrix,
@@ -286,7 +287,7 @@ def _read_spreads(table: RawTable, spreads: Spreads, part: str) -> Array:
     return np.column_stack([*lengths, tilt, heading])
 
 
-def _rows_of_frames(ids: Text) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _rows_of_frames(ids: Text) -> tuple[Indices, Indices]:
     """For each row the number of its frame, and for each frame its first row."""
     frame, _ = pd.factorize(ids)
     _, first = np.unique(frame, return_index=True)
@@ -295,9 +296,9 @@ def _rows_of_frames(ids: Text) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 
 def _refuse_differing(
     table: RawTable,
-    differs: NDArray[np.bool_],
-    frame: NDArray[np.intp],
-    first: NDArray[np.intp],
+    differs: Mask,
+    frame: Indices,
+    first: Indices,
     ids: Text,
     column: str,
     part: str,
@@ -319,8 +320,8 @@ def _yaw_from_bearing(
     bearing: YawFromBearing,
     part: str,
     position: RawPosition,
-    frame: NDArray[np.intp],
-    first: NDArray[np.intp],
+    frame: Indices,
+    first: Indices,
 ) -> tuple[Array, str]:
     """Yaw of each frame (circular mean over its rows), and a sentence about how well the rows agree."""
     latitude = numbers(table, bearing.latitude, "angle", f"{part}.latitude")

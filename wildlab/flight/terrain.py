@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from wildlab.errors import WildlabError
@@ -23,10 +22,8 @@ from wildlab.flight.manifest import TerrainPart, TerrainSays, replace_in_manifes
 from wildlab.flight.readers.terrain import ElevationMap, Heights, open_elevation
 from wildlab.flight.schema import POSITION
 from wildlab.flight.store import MOST_NODES, Flight
-from wildlab.geometry.frames import Origin, geodetic_to_ned, ned_to_geodetic
+from wildlab.geometry.frames import Array, Indices, Mask, Origin, geodetic_to_ned, ned_to_geodetic
 from wildlab.geometry.terrain import Terrain
-
-Array = NDArray[np.float64]
 
 #: Nodes of the grid that are worked on at once.
 AT_ONCE = 1_000_000
@@ -145,7 +142,7 @@ def bilinear(heights: Heights, rows: Array, columns: Array) -> Array:
 
 
 def resampling_error(
-    terrain: Terrain, places: MapPlaces, cells: NDArray[np.int64], heights: Heights
+    terrain: Terrain, places: MapPlaces, cells: Indices, heights: Heights
 ) -> tuple[float, float]:
     """How far a grid in n lies from the map's own nodes: root mean square, and the largest, metres.
 
@@ -328,7 +325,7 @@ def _cut_out(places: MapPlaces, positions: Array, margin: float, says: TerrainSa
     return CutOut(terrain, cell, every, rms, largest)
 
 
-def _positions(flight: Flight) -> tuple[Array, NDArray[np.bool_]]:
+def _positions(flight: Flight) -> tuple[Array, Mask]:
     """Where the flight and what it saw were, (N, 3) m, and which of these are poses."""
     poses = [table[POSITION].to_numpy(float) for table in flight.nav.values()]
     truth = [] if flight.truth is None else [flight.truth[POSITION].to_numpy(float)]

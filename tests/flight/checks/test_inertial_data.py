@@ -31,12 +31,8 @@ def test_the_mean_of_a_ramp_is_its_value_in_the_middle(offset, slope, start, len
     imu, end = ramps(offset, slope), start + length
     begin, stop = TIMES[[np.searchsorted(TIMES, at) for at in (start, end)]]
     middle = offset + slope * (begin + stop) / 2
-    for asked, factors in (
-        (imu.mean_force, [1, 2, 3]),
-        (imu.mean_rate, [4, 5, 6]),
-        (imu.mean_force, [1, 2, 3]),
-    ):
-        found = asked(np.array([begin, 0.0, begin]), np.array([stop, stop, 99.0]))
+    for names, factors in ((FORCE, [1, 2, 3]), (RATE, [4, 5, 6])):
+        found = imu.mean(names, np.array([begin, 0.0, begin]), np.array([stop, stop, 99.0]))
         np.testing.assert_allclose(found[0], middle * np.array(factors), atol=1e-9)
         assert np.isnan(found[1:]).all()
 

@@ -123,9 +123,9 @@ def felt(flight: Flight, source: str, imu: Inertial) -> Felt | None:
     start, end = (t[first], t[last]) if used is None else (used.start, used.end)
     middle = (start + end) / 2
     rows, R_force = attitudes_near(nav, middle)
-    force = imu.mean_force(start, end)[rows]
+    force = imu.mean(FORCE, start, end)[rows]
     acceleration = np.zeros_like(force) if used is None else used.acceleration[rows]
-    rate = imu.mean_rate(t[first], t[last])
+    rate = imu.mean(RATE, t[first], t[last])
     known = np.isfinite(force).all(axis=1) & np.isfinite(acceleration).all(axis=1)
     if known.sum() < ENOUGH or np.isfinite(rate).all(axis=1).sum() < ENOUGH:
         return None

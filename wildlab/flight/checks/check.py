@@ -11,10 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from wildlab.flight.checks.attitude import field, forces, heading
-from wildlab.flight.checks.camera import ground, image, lens, terrain_findings
 from wildlab.flight.checks.findings import (
     NORM_TOLERANCE,
     POSE,
@@ -38,13 +36,21 @@ from wildlab.flight.checks.motion import (
     together,
     without_leaps,
 )
-from wildlab.flight.checks.sensors import scans, sensors, targets
+from wildlab.flight.checks.sensors import (
+    ground,
+    image,
+    lens,
+    scans,
+    sensors,
+    targets,
+    terrain_findings,
+)
 from wildlab.flight.clock_fitting import Span
 from wildlab.flight.clocks import covariances, frame_times, gnss_times, longest_gap
 from wildlab.flight.files import printable
 from wildlab.flight.schema import NAV, POSITION, QUATERNION, TABLES, Table, extra_columns
 from wildlab.flight.store import Flight, locations_confirmed, manifest_changed
-from wildlab.geometry.frames import Array
+from wildlab.geometry.frames import Array, Mask
 from wildlab.names import listed
 
 __all__ = ["Finding", "Use", "check_flight", "find", "sense_sentences", "usable_for"]
@@ -456,7 +462,7 @@ def duplicates(flight: Flight) -> Iterator[Finding]:
         yield from _in_other_looks(flight, detections)
 
 
-def _in_one_look(detections: pd.DataFrame, again: NDArray[np.bool_]) -> Finding:
+def _in_one_look(detections: pd.DataFrame, again: Mask) -> Finding:
     rows = detections.loc[again]
     n, of, first = len(rows), len(detections), rows.iloc[0]
     level: Level = "warning" if n > FEW * of else "note"

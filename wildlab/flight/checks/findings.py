@@ -17,7 +17,6 @@ from typing import Any, Generic, Literal, TypeVar
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.flight.manifest import replace_in_manifest
@@ -26,6 +25,8 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.frames import (
     R_NED_ENU,
     Array,
+    Indices,
+    Mask,
     Origin,
     euler_to_matrix,
     geodetic_to_ned,
@@ -148,7 +149,7 @@ def number(value: float) -> str:
 
 
 def bad_rows(
-    bad: NDArray[np.bool_],
+    bad: Mask,
     level: Level | None,
     table: str,
     field: str,
@@ -169,7 +170,7 @@ def bad_rows(
         yield Finding(level or ("problem" if bad.all() else "warning"), table, field, code, counted, causes)
 
 
-def thin(n: int, most: int) -> NDArray[np.intp]:
+def thin(n: int, most: int) -> Indices:
     """At most so many of n rows, evenly."""
     return np.unique(np.linspace(0, n - 1, most).astype(np.intp))
 
@@ -364,9 +365,6 @@ def blame(
     return Finding(
         level, table, field, code, stated, tuple(one.cause for one in mistakes), tuple(corrections)
     )
-
-
-Mask = NDArray[np.bool_]
 
 
 def compare(

@@ -11,11 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 from scipy.spatial.transform import Rotation
 
@@ -33,7 +33,7 @@ from wildlab.flight.checks.findings import (
 from wildlab.flight.clocks import gnss_times
 from wildlab.flight.schema import FORCE, POSITION, QUATERNION, RATE, SECOND_COLUMNS, VELOCITY
 from wildlab.flight.store import Flight
-from wildlab.geometry.frames import Array
+from wildlab.geometry.frames import Array, Indices
 from wildlab.geometry.gravity import USUAL_GRAVITY
 
 AXES = "xyz"
@@ -49,51 +49,29 @@ STEEP = 0.7
 NEAREST_S = 0.3
 
 
+@dataclass(frozen=True)
 class Inertial:
-    """Samples: times (N,), specific force and angular rate, a column per axis (N,) each.
+    """Samples: times (N,), specific force and angular rate, a column per axis (N,) each. They are not copied:
+    ten hours at 250 Hz are nine million rows."""
 
-    Ten hours at 250 Hz are nine million rows: columns are not copied, and what is made of them is made of one
-    column at a time.
-    """
+    times: Array
+    columns: Mapping[str, Array]
 
-    def __init__(self, times: Array, columns: Mapping[str, Array]) -> None:
-        self.times = times
-        self._columns = columns
-        # Of one sensor at a time: asked for many lags in a row, and three columns of ten hours are large.
-        self._kept: tuple[tuple[str, ...], list[Array]] = ((), [])
+    @cached_property
+    def _totals(self) -> dict[str, Array]:
+        """The columns, integrated."""
+        return {
+            name: cumulative_trapezoid(values, self.times, initial=0) for name, values in self.columns.items()
+        }
 
-    def mean_force(self, start: Array, end: Array) -> Array:
-        """Mean over intervals (K,) each, (K, 3); NaN where they are not inside of the samples."""
-        return self._mean(FORCE, start, end)
-
-    def mean_rate(self, start: Array, end: Array) -> Array:
-        """The same of the angular rate."""
-        return self._mean(RATE, start, end)
-
-    def mean_of_forces(self) -> Array:
-        """Mean of all samples of the specific force. (3,)"""
-        return np.array([self._columns[name].mean() for name in FORCE])
-
-    def sizes_of_forces(self) -> Array:
-        """How long the specific force of each sample is. (N,)"""
-        total = np.zeros(len(self.times))
-        for name in FORCE:
-            total += self._columns[name] ** 2
-        return np.sqrt(total, out=total)
-
-    def _mean(self, names: Sequence[str], start: Array, end: Array) -> Array:
-        if self._kept[0] != tuple(names):
-            self._kept = ((), [])
-            self._kept = (
-                tuple(names),
-                [cumulative_trapezoid(self._columns[name], self.times, initial=0) for name in names],
-            )
-        mean = np.empty((len(start), len(names)))
-        for column, total in enumerate(self._kept[1]):
-            mean[:, column] = np.interp(end, self.times, total) - np.interp(start, self.times, total)
-        mean /= (end - start)[:, None]
+    def mean(self, names: Sequence[str], start: Array, end: Array) -> Array:
+        """Mean of `FORCE` or `RATE` over intervals (K,) each, (K, 3); NaN where they are not inside of the
+        samples."""
+        total = [self._totals[name] for name in names]
+        gained = [np.interp(end, self.times, one) - np.interp(start, self.times, one) for one in total]
+        mean = np.column_stack(gained) / (end - start)[:, None]
         mean[(start < self.times[0]) | (end > self.times[-1])] = np.nan
-        return mean
+        return np.asarray(mean)
 
 
 @dataclass(frozen=True)
@@ -195,7 +173,7 @@ def airframe_sources(flight: Flight) -> list[str]:
     return [name for name in logs if not of_camera(name)]
 
 
-def attitudes_near(nav: pd.DataFrame, times: Array) -> tuple[NDArray[np.intp], Array]:
+def attitudes_near(nav: pd.DataFrame, times: Array) -> tuple[Indices, Array]:
     """``R_nb`` of the pose nearest to each time, for those times that have one. (K,) rows, (K, 3, 3)"""
     stamps = nav["time_s"].to_numpy(float)
     after = np.clip(np.searchsorted(stamps, times), 1, len(stamps) - 1)
@@ -217,7 +195,7 @@ def increasing_rows(table: pd.DataFrame, names: Sequence[str], enough: int) -> A
 
 def intervals(
     times: Array, shortest: float = 0.9 * STEP_S, longest: float = LONGEST_S, most: int = MOST
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+) -> tuple[Indices, Indices]:
     """First and last index of each interval, evenly thinned out to so many."""
     last = np.searchsorted(times, times + shortest)
     first = np.flatnonzero(last < len(times))
@@ -339,7 +317,7 @@ def _offset(flight: Flight, imu: Inertial, moved: Moves) -> Iterator[Finding]:
     expected = np.linalg.norm(moved.force, axis=1)
 
     def felt_at(lag: float) -> Array:
-        return np.asarray(np.linalg.norm(imu.mean_force(moved.start + lag, moved.end + lag), axis=1))
+        return np.asarray(np.linalg.norm(imu.mean(FORCE, moved.start + lag, moved.end + lag), axis=1))
 
     def alike(lag: float) -> float:
         felt = felt_at(lag)
@@ -404,10 +382,10 @@ SECONDS = 300_000
 
 def _force_unit(imu: Inertial, moved: Moves | None) -> Iterator[Finding]:
     """Specific force in g, without gravity, or in another unit."""
-    size, should = float(np.median(imu.sizes_of_forces())), 0.0
+    size, should = float(np.median(np.sqrt(sum(imu.columns[name] ** 2 for name in FORCE)))), 0.0
     low, high = PLAUSIBLE
     if moved is not None and moved.measured:
-        felt_then = np.linalg.norm(imu.mean_force(moved.start, moved.end), axis=1)
+        felt_then = np.linalg.norm(imu.mean(FORCE, moved.start, moved.end), axis=1)
         good = np.isfinite(felt_then)
         if good.sum() >= ENOUGH:
             size = float(np.median(felt_then[good]))
@@ -427,7 +405,7 @@ def _force_unit(imu: Inertial, moved: Moves | None) -> Iterator[Finding]:
 def _rate_unit(imu: Inertial, moved: Moves | None) -> Iterator[Finding]:
     """Angular rate in deg/s, or taken for it."""
     if moved is not None:
-        speed = np.linalg.norm(imu.mean_rate(moved.start, moved.end), axis=1)
+        speed = np.linalg.norm(imu.mean(RATE, moved.start, moved.end), axis=1)
         course = np.abs(moved.course_rate())
         good = np.isfinite(speed) & (course > TURNING)
         ratio = np.median(speed[good] / course[good]) if good.sum() >= ENOUGH_TURNS else 1.0
@@ -441,7 +419,7 @@ def _rate_unit(imu: Inertial, moved: Moves | None) -> Iterator[Finding]:
             return
     end = imu.times[imu.times >= imu.times[0] + 1.0]
     end = end[:: max(1, len(end) // SECONDS)]
-    fast = np.linalg.norm(imu.mean_rate(end - 1.0, end), axis=1) if len(end) else np.zeros(1)
+    fast = np.linalg.norm(imu.mean(RATE, end - 1.0, end), axis=1) if len(end) else np.zeros(1)
     if (fastest := np.nanmax(fast)) > FASTEST:
         yield Finding("problem", "imu", "w_z_rad_s", "rate-too-fast", {"turned": fastest / (2 * np.pi)})
 
@@ -465,7 +443,7 @@ def turning(flight: Flight) -> Iterator[Finding]:
 
 def _gravity(imu: Inertial, moved: Moves | None) -> Iterator[Finding]:
     """On average an aircraft neither climbs nor falls: the mean force points to its upper side."""
-    mean = imu.mean_of_forces()
+    mean = np.array([imu.columns[name].mean() for name in FORCE])
     size = np.linalg.norm(mean)
     if size < USUAL_GRAVITY / 2 or mean[2] < -ALONG * size:
         return
@@ -502,7 +480,7 @@ def _turning(imu: Inertial, moved: Moves | None) -> tuple[Array, Array] | None:
     """Rates (K, 3) and how fast the course turns (K,), where there are turns."""
     if moved is None:
         return None
-    rate, course = imu.mean_rate(moved.start, moved.end), moved.course_rate()
+    rate, course = imu.mean(RATE, moved.start, moved.end), moved.course_rate()
     good = np.isfinite(rate).all(axis=1) & np.isfinite(course)
     return (rate[good], course[good]) if (good & (np.abs(course) > TURNING)).sum() >= ENOUGH else None
 

@@ -46,7 +46,7 @@ from wildlab.flight.clocks import between, frame_times, gimbal_angles, poses_at,
 from wildlab.flight.schema import POSITION
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera, normalise
-from wildlab.geometry.frames import Array, Origin, euler_to_matrix, matrix_to_euler
+from wildlab.geometry.frames import Array, Indices, Mask, Origin, euler_to_matrix, matrix_to_euler
 from wildlab.geometry.mount import R_MC_DOWN, R_MC_FORWARD, Looks, Mount, camera_pose, camera_rotation
 from wildlab.names import listed
 
@@ -109,7 +109,7 @@ class Sightings:
     p_nb: Array
     R_nb: Array
     points: Array
-    image: NDArray[np.intp]
+    image: Indices
     sd: Array
     origin: Origin
     looked: Callable[[float], SightingGeometry]
@@ -118,7 +118,7 @@ class Sightings:
     own_gimbal: bool = False
     named: bool = True
 
-    def take(self, rows: NDArray[np.bool_]) -> Sightings:
+    def take(self, rows: Mask) -> Sightings:
         """Some of the rows; the poses at other times go with them."""
 
         def looked(shift: float) -> SightingGeometry:
@@ -242,7 +242,7 @@ class Missed:
     expected: Array
 
     @property
-    def good(self) -> NDArray[np.bool_]:
+    def good(self) -> Mask:
         """Rows (N,) whose pixel has a ray."""
         return np.asarray(np.isfinite(self.turn).all(axis=1))
 
@@ -295,7 +295,7 @@ def robust_scale(size: Array) -> float:
     return float(np.median(size)) / 1.1774 if len(size) else float("nan")
 
 
-def left_over(m: Missed, fit: NDArray[np.bool_]) -> Array:
+def left_over(m: Missed, fit: Mask) -> Array:
     """Sizes (N,) of the misses less what is allowed for, in radians, by a fit to some rows.
 
     Allowed for are a small turn of the camera and a small shift of the position: robust least squares, held
@@ -339,12 +339,12 @@ def glance(s: Sightings) -> Array:
     return misfit(s, halves=False)[:, 0]
 
 
-def _sizes(m: Missed, fit: NDArray[np.bool_], judged: NDArray[np.bool_]) -> Array:
+def _sizes(m: Missed, fit: Mask, judged: Mask) -> Array:
     sizes = (left_over(m, fit), m.angle)
     return np.array([robust_scale((size / m.expected)[judged]) for size in sizes])
 
 
-def halves_of(groups: NDArray[np.intp]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def halves_of(groups: Indices) -> tuple[Mask, Mask]:
     """Rows of every other group (N,), and the rest: errors that drift are then the same in both."""
     first = np.searchsorted(np.unique(groups), groups) % 2 == 0
     return first, ~first
@@ -781,7 +781,7 @@ def _turned(m: Missed, names: NDArray[np.object_], name: str) -> str:
     return f"{name!r} ({number(angle)} deg)"
 
 
-def _off(far: NDArray[np.bool_], names: NDArray[np.object_], good: NDArray[np.bool_]) -> list[str]:
+def _off(far: Mask, names: NDArray[np.object_], good: Mask) -> list[str]:
     """Those whose points are for the most part far, where so many of them are hardly together by chance.
 
     Far ones are everywhere: wrong clicks, and detections of what is no known point.
@@ -794,7 +794,7 @@ def _off(far: NDArray[np.bool_], names: NDArray[np.object_], good: NDArray[np.bo
     # As if there had been half a far one more, so that none seen is not none ever.
     share = (far[others].sum() + 0.5) / (others.sum() + 1)
 
-    def by_chance(of: NDArray[np.bool_]) -> float:
+    def by_chance(of: Mask) -> float:
         return len(rows) * float(bdtrc(far[of].sum() - 1, of.sum(), share))
 
     return [name for name in off if by_chance(rows[name]) < BY_CHANCE]

@@ -28,9 +28,7 @@ from wildlab.flight.readers.log import (
     FIX_PLANE,
     FIX_SPACE,
     WORLD,
-    Array,
     Columns,
-    Mask,
     Messages,
     RawLog,
     Stream,
@@ -45,9 +43,9 @@ from wildlab.flight.readers.log import (
 )
 from wildlab.flight.readers.text import plural, told
 from wildlab.flight.schema import BOUNDS, FIELD, FORCE, QUATERNION, RATE, VELOCITY
+from wildlab.geometry.frames import Array, Indices, Mask
 
 Bytes = NDArray[np.uint8]
-Index = NDArray[np.int64]
 
 HEAD = b"\xa3\x95"
 #: Kind and length of messages that define the others.
@@ -175,7 +173,7 @@ def read_records(data: bytes) -> Records:
     return Records(tables, *_left_over(raw, heads, heads + lengths[kinds]))
 
 
-def _boundaries(heads: Index, ends: Index, size: int) -> list[int]:
+def _boundaries(heads: Indices, ends: Indices, size: int) -> list[int]:
     """Those of the heads that begin a message; the others are bytes of a message that look like one.
 
     A head is sure where its message ends at another head, or the file does. Where it does not, and a sure one
@@ -196,7 +194,7 @@ def _boundaries(heads: Index, ends: Index, size: int) -> list[int]:
     return begins
 
 
-def _left_over(raw: Bytes, heads: Index, ends: Index) -> tuple[int, int, bool]:
+def _left_over(raw: Bytes, heads: Indices, ends: Indices) -> tuple[int, int, bool]:
     """Bytes between messages, in how many stretches they lie, and whether some are at the end, where filling
     is none."""
     starts, stops = np.concatenate([[0], ends]), np.concatenate([heads, [len(raw)]])
@@ -207,7 +205,7 @@ def _left_over(raw: Bytes, heads: Index, ends: Index) -> tuple[int, int, bool]:
     return int(gaps.sum()), int((gaps > 0).sum()), bool(gaps[-1] > 0)
 
 
-def _table(raw: Bytes, one: Definition, heads: Index, rows: Index) -> MessageTable:
+def _table(raw: Bytes, one: Definition, heads: Indices, rows: Indices) -> MessageTable:
     layout: list[Any] = [("head", "V3")]
     layout += [(str(i), TYPES[character]) for i, character in enumerate(one.characters)]
     made: list[NDArray[Any]] = []
@@ -347,7 +345,7 @@ class ArdupilotLog(NamedTuple):
     tables: dict[str, MessageTable]
     counted_in: str
     receiver: MessageTable | None
-    rows: NDArray[np.int64]
+    rows: Indices
     stamps: Array
     fit: ClockFit | None
 

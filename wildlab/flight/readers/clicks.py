@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from wildlab.errors import WildlabError
-from wildlab.flight.files import leaves_folder, printable
+from wildlab.flight.files import printable
 from wildlab.flight.readers.frames.image import SUFFIXES
 from wildlab.flight.readers.labels import (
     IMAGE_COLUMNS,
@@ -132,8 +132,8 @@ def sizes_beside(folder: Path, names: Iterable[str]) -> dict[str, tuple[float, f
     Parameters
     ----------
     folder
-        Of the labels. Images are looked for in it, in ``images`` in it and beside it, and where a folder
-        ``labels`` above it has one ``images`` beside it, as programs that train detectors have them.
+        Of the labels. Images are looked for below it, in ``images`` beside it, and where a folder ``labels``
+        above it has one ``images`` beside it, as programs that train detectors have them.
     names
         Of images, with or without their ending, perhaps with folders; none of them leads elsewhere.
 
@@ -143,33 +143,19 @@ def sizes_beside(folder: Path, names: Iterable[str]) -> dict[str, tuple[float, f
         By those names that an image was found for.
     """
     swapped = Path(*("images" if one == "labels" else one for one in folder.parts))
-    every = dict.fromkeys([folder, folder / "images", folder.parent / "images", swapped])
-    places = [one for one in every if one.is_dir()]
     listed: dict[str, Path] = {}
-    for place in reversed(places):
-        try:
-            for one in islice(place.iterdir(), MOST_FILES):
-                if one.suffix.lower() in SUFFIXES:
-                    listed |= {one.stem: one, one.name: one}
-        except OSError:
-            continue
+    for place in (swapped, folder.parent / "images", folder):
+        for one in islice(place.rglob("*"), MOST_FILES):
+            if one.suffix.lower() in SUFFIXES:
+                listed |= {one.stem: one, one.name: one}
     found = {}
     for name in dict.fromkeys(names):
         plain = plain_path(name)
-        deep = len(plain.parts) > 1 and not leaves_folder(name)
-        own = next((place / plain for place in places if deep and _is_image(place / plain)), None)
-        path = own or listed.get(plain.name) or listed.get(plain.stem)
+        path = listed.get(plain.name) or listed.get(plain.stem)
         size = (0, 0) if path is None else size_of(read_tags(path))
         if all(size):
             found[name] = (float(size[0]), float(size[1]))
     return found
-
-
-def _is_image(path: Path) -> bool:
-    try:
-        return path.suffix.lower() in SUFFIXES and path.is_file()
-    except (OSError, ValueError):
-        return False
 
 
 def _cvat(data: bytes, path: Path) -> Marked:

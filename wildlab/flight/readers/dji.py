@@ -25,18 +25,7 @@ import pandas as pd
 
 from wildlab.errors import WildlabError
 from wildlab.flight.clock_fitting import WEEK_S, wall_to_utc, week_to_utc
-from wildlab.flight.readers.log import (
-    ANGLES,
-    PLACE,
-    UTC_OF_LOG,
-    WORLD,
-    Array,
-    Mask,
-    RawLog,
-    Stream,
-    holding,
-    named,
-)
+from wildlab.flight.readers.log import ANGLES, PLACE, UTC_OF_LOG, WORLD, RawLog, Stream, holding, named
 from wildlab.flight.readers.text import (
     calendar_s,
     decode,
@@ -49,6 +38,7 @@ from wildlab.flight.readers.text import (
     told,
 )
 from wildlab.flight.schema import VELOCITY
+from wildlab.geometry.frames import Array, Mask
 
 #: What is said of a clock without a zone.
 NO_ZONE = "local time without a zone"

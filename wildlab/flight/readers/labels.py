@@ -19,12 +19,10 @@ from typing import Annotated, Any
 import numpy as np
 import pandas as pd
 import yaml
-from numpy.typing import NDArray
 from pydantic import BaseModel, Field, RootModel
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import check_model, printable, read_regular, unreadable
-from wildlab.flight.readers.log import Mask
 from wildlab.flight.readers.text import (
     Identity,
     Real,
@@ -34,8 +32,7 @@ from wildlab.flight.readers.text import (
     plain,
     read_text_table,
 )
-
-Array = NDArray[np.float64]
+from wildlab.geometry.frames import Array, Mask
 
 #: The most bytes of a file of labels.
 MOST_BYTES = 200_000_000
@@ -593,7 +590,7 @@ def read_table(data: bytes, path: Path, *, group: str | None = None, clicks: boo
     group
         Column that says what frames belong together; None where that is not asked for.
     clicks
-        Rows that are wrong stay, as NaN; without it they are refused.
+        A point goes before a box, and what names a thing before its class.
 
     Returns
     -------
@@ -618,16 +615,16 @@ def read_table(data: bytes, path: Path, *, group: str | None = None, clicks: boo
         return WildlabError(problem, fix, file=path, field=named)
 
     def refuse(wrong: Mask, fix: str, columns: list[int]) -> None:
-        if wrong.any() and not clicks:
+        if wrong.any():
             at = int(np.flatnonzero(wrong)[0])
             seen = ", ".join(f"{header[one]} {printable(table.rows[at][one])}" for one in columns)
             raise fail(f"line {table.lines[at]} cannot be used: {seen}", fix, header[columns[0]])
 
-    if table.short and not clicks:
+    if table.short:
         line, values = table.short[0]
         raise fail(f"line {line} has {values} values, and there are {len(header)} columns", "mend it")
     image, way = find(IMAGE_COLUMNS), way_of(bare, clicks)
-    numbered = find([NUMBER_COLUMN]) if image is None and not clicks else None
+    numbered = find([NUMBER_COLUMN]) if image is None else None
     name = image if numbered is None else numbered
     if name is None:
         raise fail(f"no column names the image: there are {shown}", f"use one of {', '.join(IMAGE_COLUMNS)}")
@@ -660,22 +657,20 @@ def read_table(data: bytes, path: Path, *, group: str | None = None, clicks: boo
     empty = np.array([{row[one].strip().lower() for one in columns} <= NO_VALUE for row in table.rows])
     refuse(wrong & ~empty, "mend it, or leave the row out", columns)
     sure, kinds = find(SCORE_COLUMNS), texts(find(NAME_COLUMNS if clicks else CLASS_COLUMNS))
-    scores = numbers([]) if sure is None else table.numbers(sure)
+    scores = np.full(len(names), np.nan) if sure is None else table.numbers(sure)
     if sure is not None:
         refuse(~wrong & np.isnan(scores), "give each box a score", [sure])
     found = pd.DataFrame(given, columns=SIDES).assign(
         name=names,
         kind=kinds,
-        score=np.nan if sure is None else scores,
-        crowd=[not clicks and one.lower() in IGNORED for one in kinds],
+        score=scores,
+        crowd=[one.lower() in IGNORED for one in kinds],
         row=table.lines,
     )
-    twice = found.duplicated([*SIDES, "name", "kind"]).to_numpy() & ~wrong & (not clicks)
+    twice = found.duplicated([*SIDES, "name", "kind"]).to_numpy() & ~wrong
     belongs = None if numbered is None else _stretches(names)
     if group is not None:
         belongs = texts(header.index(group))
-    count, _, rest = table.lost()
-    left_out = _counted(rest, count)
     return Marked(
         "CSV",
         found[~empty & ~twice],
@@ -683,7 +678,7 @@ def read_table(data: bytes, path: Path, *, group: str | None = None, clicks: boo
         tuple(dict.fromkeys(kinds)),
         groups=None if belongs is None else dict(zip(names, belongs, strict=True)),
         by="name" if numbered is None else "number",
-        left_out=left_out | _counted("a row that stands in the file twice", int(twice.sum())),
+        left_out=_counted("a row that stands in the file twice", int(twice.sum())),
         counted_in="line",
     )
 

@@ -21,10 +21,7 @@ from wildlab.flight.clock_fitting import GPS_START_S
 from wildlab.flight.clocks import between
 from wildlab.flight.readers.text import LATEST_S, decode, plural
 from wildlab.flight.schema import BOUNDS, FIELD, FORCE, QUATERNION, RATE, VELOCITY
-from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from wildlab.geometry.frames import Array, Indices, Mask, matrix_to_euler, quaternion_to_matrix
 
 #: Columns that every part over time has: s since 1970 in UTC (NaN: not known), and the log's own stamp, s.
 TIMES = ("time_s", "time_log_s")
@@ -198,16 +195,11 @@ def make_stream(
     ValueError
         Where a column is not one of the part's, or has another length: a mistake of a reader.
     """
-    known = {*PARTS[part], *TIMES}
-    made: dict[str, NDArray[Any]] = {}
-    for name, values in columns.items():
-        if name not in known:
-            raise ValueError(f"{name!r} is no column of {part!r}")
-        made[name] = np.asarray(values, dtype=object if name in TEXTS else np.float64)
-    lengths = {len(one) for one in made.values()}
-    if len(lengths) != 1:
-        raise ValueError(f"columns of {part!r} have the lengths {sorted(lengths)}")
-    count = lengths.pop()
+    made = {
+        name: np.asarray(values, dtype=object if name in TEXTS else np.float64)
+        for name, values in columns.items()
+    }
+    (count,) = {len(one) for one in made.values()}
     why = np.full(count, "", dtype=object)
     for reason, holds in (unusable or {}).items():
         why[np.asarray(holds, bool) & (why == "")] = reason
@@ -406,7 +398,7 @@ def _judge_order(time: Array, have: Mapping[str, Array], bad: Mask, found: dict[
     if not len(good):
         return
 
-    def mark(reason: str, rows: NDArray[np.intp]) -> None:
+    def mark(reason: str, rows: Indices) -> None:
         found[reason] = np.zeros(len(time), bool)
         found[reason][rows] = True
 
@@ -494,22 +486,17 @@ def _reachable(time: Array, latitude: Array, longitude: Array, height: Array) ->
         return np.asarray(away <= NOISE_M + BOUNDS["speed"][1] * np.abs(time[j] - time[i]))
 
     every = np.arange(len(time))
-    starts = np.r_[0, np.flatnonzero(~reached(every[:-1], every[1:])) + 1]
-    ends = np.r_[starts[1:], len(time)]
-    longest = int(np.argmax(ends - starts))
+    runs = np.split(every, 1 + np.flatnonzero(~reached(every[:-1], every[1:])))
+    longest = int(np.argmax([len(run) for run in runs]))
     kept = np.zeros(len(time), bool)
-    kept[starts[longest] : ends[longest]] = True
-    last, first = ends[longest] - 1, starts[longest]
-    for begin, end in zip(starts[longest + 1 :], ends[longest + 1 :], strict=True):
-        near = begin + np.flatnonzero(reached(last, every[begin:end]))
-        if len(near):
-            kept[near[0] : end] = True
-            last = end - 1
-    for begin, end in zip(starts[:longest][::-1], ends[:longest][::-1], strict=True):
-        near = begin + np.flatnonzero(reached(first, every[begin:end]))
-        if len(near):
-            kept[begin : near[-1] + 1] = True
-            first = begin
+    kept[runs[longest]] = True
+    before = [run[::-1] for run in runs[:longest][::-1]]
+    for last, others in ((runs[longest][-1], runs[longest + 1 :]), (runs[longest][0], before)):
+        for run in others:
+            near = np.flatnonzero(reached(last, run))
+            if len(near):
+                kept[run[near[0] :]] = True
+                last = run[-1]
     return kept
 
 
@@ -557,7 +544,7 @@ class Messages:
 
     name: str
     fields: Mapping[str, Any]
-    rows: NDArray[np.int64]
+    rows: Indices
 
     def __len__(self) -> int:
         return len(self.rows)

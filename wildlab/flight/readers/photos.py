@@ -44,17 +44,9 @@ from wildlab.flight.readers.frames.image import (
     record_order,
     segments_of,
 )
-from wildlab.flight.readers.log import (
-    ANGLES,
-    WORLD,
-    Array,
-    RawLog,
-    Stream,
-    any_of,
-    holding,
-    named,
-)
+from wildlab.flight.readers.log import ANGLES, WORLD, RawLog, Stream, any_of, holding, named
 from wildlab.flight.readers.text import LATEST_S, plural, stamp_s, told
+from wildlab.geometry.frames import Array
 
 #: Bytes of XMP that are looked through.
 MOST_XMP = 1_000_000
@@ -180,8 +172,6 @@ EARLIEST_S = 631_151_999.0
 DIAGONAL_35MM = math.hypot(36.0, 24.0)
 #: Kinds of fix as MAVLink numbers them, by DJI's RtkFlag.
 RTK_FIXES = {16: 3.0, 32: 5.0, 34: 5.0, 50: 6.0}
-#: Two statements of one focal length that differ by more contradict each other.
-CONTRADICTS = 0.1
 #: Where focal lengths in px come from, best first.
 CALIBRATED, BY_SENSOR, BY_SIZE, BY_VIEW, BY_FILM = (
     "calibrated by the maker",
@@ -406,8 +396,8 @@ def _offset(said: str) -> float:
 # -- focal lengths
 
 
-def focal_px_of(tags: Tags, width: int, height: int) -> list[tuple[str, float]]:
-    """Every statement of a focal length in px, with what it comes from, best first.
+def focal_px_of(tags: Tags, width: int, height: int) -> tuple[str, float]:
+    """The best statement of a focal length in px, behind what it comes from; "" and NaN where there is none.
 
     Parameters
     ----------
@@ -423,7 +413,7 @@ def focal_px_of(tags: Tags, width: int, height: int) -> list[tuple[str, float]]:
     """
     found: list[tuple[str, float]] = []
     if not width or not height:
-        return found
+        return "", NAN
     scale = max(width, height) / max(tags.width or width, tags.height or height)
     own = dewarped_of(tags)
     if not math.isfinite(own):
@@ -432,21 +422,18 @@ def focal_px_of(tags: Tags, width: int, height: int) -> list[tuple[str, float]]:
         found.append((CALIBRATED, own * scale))
     mm = _mm(tags)
     per_mm = [_per_mm(tags, axis) for axis in "XY"]
-    if mm > 0 and all(map(math.isfinite, per_mm)):
-        square = abs(per_mm[0] / per_mm[1] - 1) < 0.01
-        # Some cameras write the size of their sensor where its resolution belongs: then pixels are square by
-        # that reading, and by the standard's they are as oblong as the image.
-        pitches = per_mm[0] / width, per_mm[1] / height
-        if square:
-            found.append((BY_SENSOR, mm * per_mm[0] * scale))
-        elif abs(pitches[0] / pitches[1] - 1) < 0.01:
-            found.append((BY_SIZE, mm / pitches[0]))
+    if mm > 0 and abs(per_mm[0] / per_mm[1] - 1) < 0.01:
+        found.append((BY_SENSOR, mm * per_mm[0] * scale))
+    # Some cameras write the size of their sensor where its resolution belongs: then pixels are square by that
+    # reading, and by the standard's they are as oblong as the image.
+    elif mm > 0 and abs(per_mm[0] / width * height / per_mm[1] - 1) < 0.01:
+        found.append((BY_SIZE, mm * width / per_mm[0]))
     if 0 < tags.view_deg < 179:
         found.append((BY_VIEW, width / 2 / math.tan(math.radians(tags.view_deg) / 2)))
     film = number(tags.exif.get("FocalLengthIn35mmFilm"))
     if 0 < film < 1e5:
         found.append((BY_FILM, film * math.hypot(width, height) / DIAGONAL_35MM))
-    return [(what, px) for what, px in found if 1 < px < 1e7]
+    return next(((what, px) for what, px in found if 1 < px < 1e7), ("", NAN))
 
 
 def dewarped_of(tags: Tags) -> float:
@@ -555,8 +542,7 @@ def folder_decode(folder: Path, zone: str | None) -> RawLog:
         for path, place in zip(paths, above, strict=True)
     ]
     cameras = _cameras(files, tags, sizes)
-    stated = [focal_px_of(one, *size) for one, size in zip(tags, sizes, strict=True)]
-    focal = [one[0] if one else ("", NAN) for one in stated]
+    focal = [focal_px_of(one, *size) for one, size in zip(tags, sizes, strict=True)]
     columns: dict[str, Any] = {"file": files, "latitude_deg": latitude, "longitude_deg": longitude}
     for names, of in _COLUMNS.items():
         table = named(names, np.array([of(one) for one in tags], float).T)
@@ -591,7 +577,7 @@ def folder_decode(folder: Path, zone: str | None) -> RawLog:
         vehicle=makers.pop() if len(makers) == 1 else "",
         clock=max(clocks, key=clocks.__getitem__, default=""),
         lost=told(*lost, *((count, "image", f": {what}") for what, count in problems.items())),
-        notes=[*notes, *_notes(tags, cameras, stated, why)],
+        notes=[*notes, *_notes(tags, cameras, why)],
     )
 
 
@@ -659,17 +645,9 @@ def _times(tags: list[Tags], zone: str | None) -> tuple[Array, Array, str, list[
     return wall, time, clock, holding(notes)
 
 
-def _notes(
-    tags: list[Tags], cameras: list[str], stated: list[list[tuple[str, float]]], why: list[str]
-) -> list[str]:
-    """What a user should know of a folder: cameras, sizes, tags that contradict each other, heights."""
+def _notes(tags: list[Tags], cameras: list[str], why: list[str]) -> list[str]:
+    """What a user should know of a folder: cameras, sizes, heights."""
     notes: Counter[str] = Counter(one for one in why if one)
-    for focal in filter(None, stated):
-        by, used = focal[0]
-        for what, px in focal[1:]:
-            if abs(px / used - 1) > CONTRADICTS:
-                both = f"{used:.0f} px ({by}, used), {px:.0f} px ({what})"
-                notes[f"tags contradict each other on the focal length: {both}"] += 1
     rtk = [rtk_of(one) for one in tags]
     fixed = [one in RTK_FIXES for one in rtk]
     notes["heights with RTK count from the ellipsoid"] = sum(fixed)

@@ -25,7 +25,6 @@ from wildlab.flight.readers.log import (
     FIX_SPACE,
     LAT_LON,
     WORLD,
-    Array,
     Messages,
     RawLog,
     Stream,
@@ -39,6 +38,7 @@ from wildlab.flight.readers.log import (
     wrapped,
 )
 from wildlab.flight.schema import FIELD, FORCE, QUATERNION, RATE, VELOCITY
+from wildlab.geometry.frames import Array
 
 MAGIC = b"ULog\x01\x12\x35"
 #: Of each message before its content.

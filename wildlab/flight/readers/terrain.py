@@ -17,12 +17,12 @@ from wildlab.errors import WildlabError
 from wildlab.files import sha256
 from wildlab.flight.files import gdal, printable, regular_size
 from wildlab.flight.manifest import UNITS, TerrainSays
+from wildlab.geometry.frames import Indices
 
 if TYPE_CHECKING:
     from pyproj import CRS
     from rasterio import Affine
 
-Array = NDArray[np.float64]
 Heights = NDArray[np.float32]
 
 #: Metres above the sea: the Dead Sea's shore lies at -430, mount Everest at 8849.
@@ -116,7 +116,7 @@ class ElevationMap:
 
     def window(
         self, row: int, column: int, rows: int, columns: int, every: int
-    ) -> tuple[Heights, NDArray[np.int64], Heights]:
+    ) -> tuple[Heights, Indices, Heights]:
         """Heights of a window, cells averaged ``every`` by ``every``, and some of the cells themselves.
 
         Parameters

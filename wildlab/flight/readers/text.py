@@ -16,14 +16,12 @@ from typing import Annotated, Any, NamedTuple, TypeVar
 from xml.etree.ElementTree import Element, ParseError, iterparse
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import AllowInfNan, FailFast, Strict
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import printable
+from wildlab.geometry.frames import Array
 from wildlab.names import from_csv_cell
-
-Array = NDArray[np.float64]
 
 #: No log is from after this, s since 1970.
 LATEST_S = datetime(2100, 1, 1, tzinfo=UTC).timestamp()
@@ -31,8 +29,6 @@ LATEST_S = datetime(2100, 1, 1, tzinfo=UTC).timestamp()
 MOST_ROWS, MOST_COLUMNS, MOST_LETTERS = 1_000_000, 200, 1000
 #: Plain decimal numbers only: `float` would read "1_0", "nan" and "infinity" too.
 _NUMBER = re.compile(r"\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d{1,3})?\s*", re.ASCII)
-#: What plain numbers have none of.
-_STRANGE = re.compile(r"[^0-9eE+. -]")
 _STAMP = re.compile(
     r"\s*(\d{4})[-:./](\d\d?)[-:./](\d\d?)[ T]+(\d\d?):(\d\d?):(\d\d?(?:\.\d*)?)\s*", re.ASCII
 )
@@ -74,13 +70,6 @@ def number(text: str | bytes | None, comma: bool = False) -> float:
 
 def numbers(texts: Iterable[str | None]) -> Array:
     """(N,) plain decimal numbers, NaN where a text is none."""
-    texts = list(texts)
-    if not _STRANGE.search("".join([text for text in texts if text])):
-        try:
-            values = np.array([float(text) if text else np.nan for text in texts])
-            return np.where(np.isfinite(values), values, np.nan)
-        except ValueError:
-            pass
     return np.array([number(text) for text in texts], dtype=float)
 
 

@@ -26,8 +26,6 @@ from wildlab.flight.readers.log import (
     ANGLES,
     LAT_LON,
     WORLD,
-    Array,
-    Mask,
     Messages,
     RawLog,
     Stream,
@@ -43,6 +41,7 @@ from wildlab.flight.readers.log import (
 )
 from wildlab.flight.readers.text import told
 from wildlab.flight.schema import FIELD, FORCE, RATE, VELOCITY
+from wildlab.geometry.frames import Array, Mask
 from wildlab.geometry.gravity import STANDARD_GRAVITY
 
 #: MAV_AUTOPILOT_INVALID and MAV_TYPE_GCS: what is no autopilot says so in its heartbeat.

@@ -34,19 +34,11 @@ from numpy.typing import NDArray
 from wildlab.errors import WildlabError
 from wildlab.flight.clock_fitting import GPS_START_S, WEEK_S, gps_to_utc
 from wildlab.flight.readers import text
-from wildlab.flight.readers.log import (
-    UTC_OF_LOG,
-    Array,
-    Mask,
-    RawLog,
-    Stream,
-    holding,
-    level_velocity,
-    named,
-)
+from wildlab.flight.readers.log import UTC_OF_LOG, RawLog, Stream, holding, level_velocity, named
 from wildlab.flight.readers.text import number, numbers, parse_xml, plural, stamp_s, told
 from wildlab.flight.schema import VELOCITY
 from wildlab.geometry.attitude_uncertainty import tilt_from_roll_pitch
+from wildlab.geometry.frames import Array, Indices, Mask
 
 # -- NMEA 0183
 
@@ -305,8 +297,8 @@ class UbxFrames(NamedTuple):
     """
 
     data: bytes
-    start: NDArray[np.int64]
-    stop: NDArray[np.int64]
+    start: Indices
+    stop: Indices
 
     def rows(self, kind: tuple[int, int]) -> pd.DataFrame:
         """Fields of all messages of a kind, `which` of the file's they are, from 1, and `own_s`: time of
@@ -650,7 +642,7 @@ MOST_BYTES = 64 << 20
 FURTHEST_M = 1e6
 
 
-def read_part(path: Path, data: bytes, part: Part) -> tuple[dict[str, NDArray[Any]], NDArray[np.int64]]:
+def read_part(path: Path, data: bytes, part: Part) -> tuple[dict[str, NDArray[Any]], Indices]:
     """Columns of one part of a file, and for each row the number of the frame in the file, counted from 1.
 
     A file of detections is a list of frames, each of one sensor at one time: where own ship was, and what the
@@ -689,9 +681,7 @@ def _given(frame: Any, at: int, field: str, shape: Sequence[int], most: float, p
     return values
 
 
-def _detections(
-    content: list[Any], part: Part, path: Path
-) -> tuple[dict[str, NDArray[Any]], NDArray[np.int64]]:
+def _detections(content: list[Any], part: Part, path: Path) -> tuple[dict[str, NDArray[Any]], Indices]:
     rows, seen = [], []
     for at, one in enumerate(content, 1):
         sensor = SENSORS[int(_given(one, at, "sensorID", (), 4, path))]
@@ -717,7 +707,7 @@ def _detections(
     return names | named(measures, values.T), np.repeat(ours.index.to_numpy(), counts) + 1
 
 
-def _truth(content: list[Any], path: Path) -> tuple[dict[str, NDArray[Any]], NDArray[np.int64]]:
+def _truth(content: list[Any], path: Path) -> tuple[dict[str, NDArray[Any]], Indices]:
     names = ["target", "time", "north", "east", "down"]
     table = pd.DataFrame(
         [

@@ -51,6 +51,7 @@ from wildlab.flight.readers.frames.scene import (
     measure_vignetting,
     without_vignetting,
 )
+from wildlab.geometry.frames import Mask
 
 __all__ = ["Frame", "Frames", "Polarity", "Unit", "open_frames", "read_image"]
 
@@ -80,8 +81,8 @@ class Kept:
     """
 
     size: tuple[int, ...] = ()
-    overlay: NDArray[np.bool_] | None = None
-    dead: NDArray[np.bool_] | None = None
+    overlay: Mask | None = None
+    dead: Mask | None = None
     vignetting: Vignetting | None = None
     held_can_be_told: bool = False
     notes: tuple[str, ...] = ()
@@ -305,7 +306,7 @@ def _grey(image: NDArray[Any]) -> NDArray[Any]:
     return image if image.ndim == 2 else np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY))
 
 
-def filled(image: NDArray[Any], dead: NDArray[np.bool_]) -> NDArray[Any]:
+def filled(image: NDArray[Any], dead: Mask) -> NDArray[Any]:
     """An image whose dead pixels have the median of the 3 x 3 about them; colour stays as it is."""
     if image.ndim != 2:
         return image

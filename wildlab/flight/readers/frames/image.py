@@ -31,6 +31,7 @@ from PIL import Image, TiffImagePlugin
 from wildlab.errors import WildlabError
 from wildlab.flight.files import printable, read_regular, unreadable
 from wildlab.flight.readers.frames.scene import find_clipped, find_no_data, problem_of
+from wildlab.geometry.frames import Mask
 
 #: The most pixels that are decoded: four times the largest camera sensors that fly on small aircraft.
 MOST_PIXELS = 100_000_000
@@ -383,7 +384,7 @@ class Frame:
     image: NDArray[Any]
     unit: Unit
     polarity: Polarity
-    valid: NDArray[np.bool_]
+    valid: Mask
     problem: str = ""
     note: str = ""
 

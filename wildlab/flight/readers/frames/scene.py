@@ -17,8 +17,9 @@ from typing import Any, NamedTuple
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
-Mask = NDArray[np.bool_]
+from wildlab.geometry.frames import Mask
 
 #: Grey levels by which JPEG makes an empty border uneven.
 JPEG_UNEVEN = 4
@@ -204,7 +205,7 @@ SMALL, STANDS_OUT, CLIPPED_AT = 5, 7.0, 5.0
 HELD, MOST_ALIKE = 3, 0.25
 
 
-def is_shutter(image: NDArray[Any], valid: NDArray[np.bool_]) -> bool:
+def is_shutter(image: NDArray[Any], valid: Mask) -> bool:
     """Whether an image has noise and nothing else, as that of a closed shutter.
 
     Parameters
@@ -234,7 +235,7 @@ def is_shutter(image: NDArray[Any], valid: NDArray[np.bool_]) -> bool:
     return _is_even(grey, valid, BLOCK, MOST_RATIO)
 
 
-def _is_even(image: NDArray[Any], valid: NDArray[np.bool_], side: int, most_ratio: float) -> bool:
+def _is_even(image: NDArray[Any], valid: Mask, side: int, most_ratio: float) -> bool:
     rows, columns = (length // side for length in image.shape)
     if rows * columns < FEWEST_BLOCKS:
         return False
@@ -440,17 +441,13 @@ def measure_vignetting(images: Sequence[NDArray[Any]], valid: Mask) -> Vignettin
     half = np.array([(rows - 1) / 2, (columns - 1) / 2])
     square = ((v - half[0]) ** 2 + (u - half[1]) ** 2) / max(float((half**2).sum()), 1.0)
     # Rings of one area: of r^2 evenly.
-    ring = np.minimum((square * RINGS).astype(int), RINGS - 1)
-    inside = [np.flatnonzero(valid & (ring == number)) for number in range(RINGS)]
-    enough = [number for number, pixels in enumerate(inside) if len(pixels) >= 16]
+    ring = np.where(valid, np.minimum((square * RINGS).astype(int), RINGS - 1), RINGS)
+    pixels = np.bincount(ring.ravel(), minlength=RINGS)[:RINGS]
+    enough = np.flatnonzero(pixels >= 16)
     if len(enough) < RINGS // 2:
         return None
-    at = np.array([square.ravel()[inside[number]].mean() for number in enough])
-    weight = np.sqrt([len(inside[number]) for number in enough])
-    falls = []
-    for image in images:
-        flat = image.ravel().astype(float)
-        falls.append([np.nanmedian(flat[inside[number]]) for number in enough])
+    at, weight = ndimage.mean(square, ring, enough), np.sqrt(pixels[enough])
+    falls = [ndimage.median(image, ring, enough) for image in images]
     design = np.stack([np.ones(len(at)), at, at**2], axis=1) * weight[:, None]
     fits, *_ = np.linalg.lstsq(design, (np.array(falls) * weight).T, rcond=None)
     corners = fits[1] + fits[2]
