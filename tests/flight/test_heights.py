@@ -9,8 +9,8 @@ import pytest
 
 from wildlab.errors import WildlabError
 from wildlab.flight import heights
-from wildlab.flight.heights import choose_reference, undulation
 from wildlab.flight.readers.log import Stream, make_stream
+from wildlab.flight.terrain import choose_reference, undulation
 
 GEOID = 40.0
 

@@ -36,13 +36,13 @@ from wildlab.flight.card_items import (
     span_of,
 )
 from wildlab.flight.files import dump_toml, is_safe_name, printable, read_toml
-from wildlab.flight.heights import NO_GRID, HeightPlan, HeightUse, choose_reference
 from wildlab.flight.importing import import_flight
 from wildlab.flight.manifest import CameraPart, TerrainSays
 from wildlab.flight.readers.clicks import note_of_kinds
 from wildlab.flight.readers.log import PARTS, Stream
 from wildlab.flight.schema import QUATERNION
 from wildlab.flight.store import Flight
+from wildlab.flight.terrain import NO_GRID, HeightPlan, HeightUse, choose_reference
 from wildlab.paths import DATA
 
 #: Rows that can be used.

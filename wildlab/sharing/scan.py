@@ -26,9 +26,9 @@ import pandas as pd
 from pyproj import Proj
 
 from wildlab.errors import WildlabError
-from wildlab.flight.heights import undulation
 from wildlab.flight.manifest import Manifest, parse_settings
 from wildlab.flight.store import Flight
+from wildlab.flight.terrain import undulation
 from wildlab.geometry.frames import Array, ned_to_geodetic
 from wildlab.geometry.gravity import normal_gravity
 from wildlab.paths import ROOT

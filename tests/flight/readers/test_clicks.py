@@ -111,12 +111,13 @@ def test_sizes_of_images_beside_labels(tmp_path, layout):
 
 
 def test_points():
-    log = read(HERE, b'image,name,u_px,v_px\na.jpg,007,1.5,-0.5\n"b,c.jpg",,3,4\nd.jpg,X,,\n')
-    assert column(log, "image") == ["a.jpg", "b,c.jpg"]
-    assert column(log, "name") == ["007", ""]
-    assert column(log, "u_px") == [1.5, 3.0]
+    log = read(HERE, b'image,name,u_px,v_px\na.jpg,007,1.5,-0.5\n"b,c.jpg",,3,4\nd.jpg,X,,\ne.jpg,Y,1,z\n')
+    assert column(log, "image") == ["a.jpg", "b,c.jpg", "e.jpg"]
+    assert column(log, "name") == ["007", "", "Y"]
+    assert column(log, "u_px")[:2] == [1.5, 3.0]
     assert np.isnan(column(log, "box_u_px")).all()
-    assert log.parts["clicks"].used.all() and log.parts["clicks"].rows.tolist() == [2, 3]
+    assert column(log, "why") == ["", "", "no place in the image"]
+    assert log.parts["clicks"].rows.tolist() == [2, 3, 5]
     comma = read(HERE, b"image;marker;u;v\na.jpg;A;1,5;2,25\n")
     assert (column(comma, "u_px"), column(comma, "v_px")) == ([1.5], [2.25])
 
@@ -127,7 +128,6 @@ def test_points():
         (b"image,name\na.jpg,A\n", "say where"),
         (b"name,u,v\nA,1,2\n", "names the image"),
         (b"image,u,v\na.jpg,,\n", "marks nothing"),
-        (b"image,u,v\na.jpg,1,2\nb.jpg,1,z\n", "line 3 cannot be used"),
         (b"image,x,y,w,h\na.jpg,0.1,0.2,0.1,0.1\n", "shares"),
         (b"{}", "no format"),
         (b"[[[", "begins like"),

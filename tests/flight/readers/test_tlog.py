@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega
 from tests.flight.readers.mavlink_logs import BOOT_S, START_S, frame, joined, made, telemetry
 from tests.flight.readers.tracks import Reader, check, near
 from wildlab.flight.readers import recognise
-from wildlab.flight.readers.tlog import walk
+from wildlab.flight.readers.telemetry import walk
 
 tlog = Reader("tlog")
 

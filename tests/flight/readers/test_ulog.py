@@ -13,7 +13,7 @@ from tests.flight.readers.mavlink_logs import START_S, message, ulog
 from tests.flight.readers.tracks import Reader, check, near
 from wildlab.errors import WildlabError
 from wildlab.flight.readers import recognise
-from wildlab.flight.readers.px4 import TOPICS
+from wildlab.flight.readers.telemetry import TOPICS
 
 reader = Reader("ulog")
 

@@ -52,8 +52,8 @@ class Format(NamedTuple):
 FORMATS: dict[str, Format] = {
     "dataflash": Format("ardupilot", "ArduPilot DataFlash log"),
     "dataflash-text": Format("ardupilot", "ArduPilot DataFlash log as text", start="text_"),
-    "ulog": Format("px4", "PX4 ULog"),
-    "tlog": Format("tlog", "MAVLink telemetry log"),
+    "ulog": Format("telemetry", "PX4 ULog", start="ulog_"),
+    "tlog": Format("telemetry", "MAVLink telemetry log", start="tlog_"),
     "ubx": Format("tracks", "u-blox UBX", track=True, start="ubx_"),
     "gpx": Format("tracks", "GPX track", track=True, start="gpx_"),
     "dji-srt": Format("dji", "DJI subtitles", track=True, start="srt_"),

@@ -590,7 +590,8 @@ def read_table(data: bytes, path: Path, *, group: str | None = None, clicks: boo
     group
         Column that says what frames belong together; None where that is not asked for.
     clicks
-        A point goes before a box, and what names a thing before its class.
+        Rows that are wrong stay, as NaN; without it they are refused. A point goes before a box, and what
+        names a thing before its class.
 
     Returns
     -------
@@ -615,12 +616,12 @@ def read_table(data: bytes, path: Path, *, group: str | None = None, clicks: boo
         return WildlabError(problem, fix, file=path, field=named)
 
     def refuse(wrong: Mask, fix: str, columns: list[int]) -> None:
-        if wrong.any():
+        if wrong.any() and not clicks:
             at = int(np.flatnonzero(wrong)[0])
             seen = ", ".join(f"{header[one]} {printable(table.rows[at][one])}" for one in columns)
             raise fail(f"line {table.lines[at]} cannot be used: {seen}", fix, header[columns[0]])
 
-    if table.short:
+    if table.short and not clicks:
         line, values = table.short[0]
         raise fail(f"line {line} has {values} values, and there are {len(header)} columns", "mend it")
     image, way = find(IMAGE_COLUMNS), way_of(bare, clicks)
@@ -667,10 +668,11 @@ def read_table(data: bytes, path: Path, *, group: str | None = None, clicks: boo
         crowd=[one.lower() in IGNORED for one in kinds],
         row=table.lines,
     )
-    twice = found.duplicated([*SIDES, "name", "kind"]).to_numpy() & ~wrong
+    twice = found.duplicated([*SIDES, "name", "kind"]).to_numpy() & ~wrong & (not clicks)
     belongs = None if numbered is None else _stretches(names)
     if group is not None:
         belongs = texts(header.index(group))
+    count, _, rest = table.lost()
     return Marked(
         "CSV",
         found[~empty & ~twice],
@@ -678,7 +680,7 @@ def read_table(data: bytes, path: Path, *, group: str | None = None, clicks: boo
         tuple(dict.fromkeys(kinds)),
         groups=None if belongs is None else dict(zip(names, belongs, strict=True)),
         by="name" if numbered is None else "number",
-        left_out=_counted("a row that stands in the file twice", int(twice.sum())),
+        left_out=_counted(rest, count) | _counted("a row that stands in the file twice", int(twice.sum())),
         counted_in="line",
     )
 
