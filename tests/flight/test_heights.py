@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from wildlab.errors import WildlabError
-from wildlab.flight import heights
+from wildlab.flight import terrain
 from wildlab.flight.readers.log import Stream, make_stream
 from wildlab.flight.terrain import choose_reference, undulation
 
@@ -36,7 +36,7 @@ def positions(unusable: np.ndarray | None = None, **columns: object) -> Stream:
 
 @pytest.fixture(autouse=True)
 def no_grid(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(heights, "undulation", lambda *place: None)
+    monkeypatch.setattr(terrain, "undulation", lambda *place: None)
 
 
 @pytest.fixture

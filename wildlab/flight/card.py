@@ -26,7 +26,6 @@ from wildlab.flight.card_items import (
     PARTS_SHOWN,
     ROLES,
     Choice,
-    camera_of_images,
     choose_roles,
     clock_of_images,
     has_place,
@@ -39,7 +38,8 @@ from wildlab.flight.files import dump_toml, is_safe_name, printable, read_toml
 from wildlab.flight.importing import import_flight
 from wildlab.flight.manifest import CameraPart, TerrainSays
 from wildlab.flight.readers.clicks import note_of_kinds
-from wildlab.flight.readers.log import PARTS, Stream
+from wildlab.flight.readers.log import PARTS, RawLog, Stream
+from wildlab.flight.readers.photos import camera_of
 from wildlab.flight.schema import QUATERNION
 from wildlab.flight.store import Flight
 from wildlab.flight.terrain import NO_GRID, HeightPlan, HeightUse, choose_reference
@@ -316,7 +316,7 @@ class Proposal:
             for one in self.by_role["images"]
             if one.item.name != images.item.name
         ]
-        camera, how = camera_of_images(images.item, wishes.camera, wishes.focal_px)
+        camera, how = camera_of(images.item.log or RawLog({}), wishes.camera, wishes.focal_px)
         if camera is None:
             self.notes.append(f"The images are left out: {how}. Give --camera or --focal.")
             return

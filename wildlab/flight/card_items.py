@@ -28,7 +28,7 @@ from wildlab.flight.raw_files import RAW_LIMIT, match_images
 from wildlab.flight.readers import FOLDERS, FORMATS, HEAD, read_folder, read_log, recognise
 from wildlab.flight.readers.frames.image import SUFFIXES
 from wildlab.flight.readers.log import RawLog, Stream
-from wildlab.flight.readers.photos import camera_of, of_camera
+from wildlab.flight.readers.photos import of_camera
 from wildlab.flight.readers.text import header_of
 from wildlab.geometry.frames import Array, geodetic_to_ned
 from wildlab.names import listed
@@ -677,48 +677,6 @@ def one_camera(
     )
     note = f"{note} (--role {images.name}=images:NAME chooses)." if others else ""
     return replace(images, log=of_camera(images.log, chosen)), chosen, note
-
-
-def camera_of_images(
-    images: CardItem, stated: CameraPart | None, focal_px: float | None = None
-) -> tuple[CameraPart | None, str]:
-    """The camera that took the images and how it is known, in a clause; or None and why it is not.
-
-    What the user states, the camera or its focal length alone, counts for more than the tags.
-    """
-    if images.log is None:
-        return None, images.problem
-    columns = images.log.parts["photos"].columns
-    sizes = np.column_stack([columns["width_px"], columns["height_px"]])
-    sizes = np.unique(sizes[np.isfinite(sizes).all(axis=1)], axis=0)
-    if stated is not None:
-        own = (stated.width_px, stated.height_px)
-        if len(sizes) and (sizes != own).any():
-            seen = ", ".join("{:.0f} x {:.0f}".format(*one) for one in sizes[:4])
-            return None, f"the stated camera has {own[0]} x {own[1]} px, and they have {seen}"
-        return stated, "as you stated it"
-    if focal_px is not None:
-        if len(sizes) != 1:
-            return None, "they are of several sizes" if len(sizes) else "nothing says how large they are"
-        names = {str(one) for one in columns.get("camera", ())} - {""}
-        found: dict[str, Any] | None = {
-            **{"camera": names.pop() if len(names) == 1 else "", "focal_px": focal_px},
-            **{"width_px": int(sizes[0, 0]), "height_px": int(sizes[0, 1]), "how": "as you stated it"},
-        }
-    else:
-        try:
-            found = camera_of(images.log)
-        except WildlabError as error:
-            return None, error.problem
-    if found is None:
-        return None, "no tag has the focal length in pixels"
-    width, height, focal = found["width_px"], found["height_px"], found["focal_px"]
-    camera = CameraPart(
-        **{"name": found["camera"] or "not stated", "width_px": width, "height_px": height},
-        **{"fx_px": focal, "fy_px": focal, "cx_px": (width - 1) / 2, "cy_px": (height - 1) / 2},
-    )
-    how = f"{width} x {height} px, focal length {focal:.0f} px ({found['how']})"
-    return camera, f"{how}; a central principal point, no distortion"
 
 
 def clock_of_images(

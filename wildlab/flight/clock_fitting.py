@@ -23,8 +23,8 @@ Span = tuple[float, float]
 
 #: Stamps are numbers of this resolution at best: s since 1970 in 64 bits.
 RESOLUTION_S = 1e-6
-#: Tukey's biweight: residuals beyond so many standard deviations are outliers (95 % efficient for a normal).
-REACH = 4.685
+#: Residuals beyond so many standard deviations are outliers.
+REACH = 3.0
 #: Fewer pairs than this are all believed.
 FEW = 6
 
@@ -129,29 +129,21 @@ def _start(dx: Array, dy: Array) -> tuple[float, float]:
 def _through(dx: Array, dy: Array, at_0: float, rate: float, resolution_s: float) -> _Line:
     """The line through the points, and what is known of it."""
     turns = len(dx) > 2 and bool(np.ptp(dx) > 0)
-    A = np.column_stack([np.ones(len(dx)), dx]) if turns else np.ones((len(dx), 1))
-    solution = np.array([at_0, rate])[: A.shape[1]]
-    base = dy if turns else dy - rate * dx
-    scale = max(_scale(base - A @ solution), resolution_s)
-    weight = np.ones(len(dx))
+    used = np.ones(len(dx), bool)
     for _ in range(50):
-        far = (base - A @ solution) / (REACH * scale)
+        before = used
+        far = np.abs(dy - at_0 - rate * dx)
         # Of a handful none is in the minority, and half of all stamps are right where any are.
         if len(dx) >= FEW:
-            weight = np.where(np.abs(far) < 1, (1 - far**2) ** 2, 0.0)
-        if (weight > 0.01).sum() < len(dx) / 2:
-            weight = (np.abs(far) <= np.median(np.abs(far))).astype(float)
-        root = np.sqrt(weight)[:, None]
-        found, *_ = np.linalg.lstsq(root * A, root[:, 0] * base, rcond=None)
-        step, solution = found - solution, found
-        scale = max(_scale((base - A @ solution)[weight > 0]), resolution_s)
-        if np.abs(step[0]) + np.abs(step[1:]).sum() * np.ptp(dx) < 1e-9:
+            used = far <= max(REACH * 1.4826 * float(np.median(far)), resolution_s)
+        if turns:
+            rate, at_0 = np.polyfit(dx[used], dy[used], 1)
+        else:
+            at_0 = float(np.mean((dy - rate * dx)[used]))
+        if (used == before).all():
             break
-    used = weight > 0
-    left = (base - A @ solution)[used]
-    if not turns:
-        return float(solution[0]), rate, used, np.inf
-    return float(solution[0]), float(solution[1]), used, _rate_sd(dx[used], left)
+    left = (dy - at_0 - rate * dx)[used]
+    return float(at_0), float(rate), used, _rate_sd(dx[used], left) if turns else np.inf
 
 
 def _under(dx: Array, dy: Array, at_0: float, rate: float) -> _Line:

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 from scipy.spatial.transform import Rotation
 from scipy.special import bdtrc
 
@@ -377,7 +378,6 @@ HOURS = tuple(h for h in np.arange(-14.0, 14.25, 0.25) if h)
 LEAP_S = (18.0, -18.0, 19.0, -19.0, 37.0, -37.0)
 #: A mount is off by a few degrees and no wrong meaning; beyond the second, a turn is one of the usual ones.
 TURNED_DEG, LARGEST_TURN_DEG, REFITS = 5.0, 40.0, 6
-GOLDEN = (np.sqrt(5) - 1) / 2
 #: A lever arm is no longer than this, m.
 LONGEST_LEVER = 5.0
 
@@ -613,11 +613,8 @@ def best_of(cost: Callable[[float], float], grid: Array) -> float:
     if not np.isfinite(costs).any():
         return 0.0
     k = int(np.nanargmin(np.where(np.isfinite(costs), costs, np.inf)))
-    low, high = float(grid[max(k - 1, 0)]), float(grid[min(k + 1, len(grid) - 1)])
-    for _ in range(12):
-        a, b = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
-        low, high = (low, b) if cost(a) < cost(b) else (a, high)
-    return (low + high) / 2
+    about = grid[max(k - 1, 0)], grid[min(k + 1, len(grid) - 1)]
+    return float(minimize_scalar(cost, bounds=about, options={"maxiter": 14}).x)
 
 
 def _cost(s: Sightings) -> float:

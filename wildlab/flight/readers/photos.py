@@ -30,6 +30,7 @@ from scipy.spatial.transform import Rotation
 from wildlab.errors import WildlabError
 from wildlab.flight.clock_fitting import wall_to_utc
 from wildlab.flight.files import regular_size, unreadable
+from wildlab.flight.manifest import CameraPart
 from wildlab.flight.readers.frames.image import (
     CAMERA,
     MOST_BYTES,
@@ -701,41 +702,51 @@ def of_camera(log: RawLog, camera: str) -> RawLog:
     return replace(log, parts={**log.parts, "photos": stream.take(stream.columns["camera"] == camera)})
 
 
-def camera_of(log: RawLog) -> dict[str, Any] | None:
-    """Name, size and focal length (px, and ``how``: what it is from) of the one camera of a folder.
+def camera_of(
+    log: RawLog, stated: CameraPart | None = None, focal_px: float | None = None
+) -> tuple[CameraPart | None, str]:
+    """The one camera of a folder and how it is known, in a clause; or None and why it is not.
 
-    None where no tag says a focal length in px, or a size.
-
-    Raises
-    ------
-    WildlabError
-        Where images are of several cameras, sizes or focal lengths.
+    What the user states, the camera or its focal length alone, counts for more than the tags.
     """
     columns = log.parts["photos"].columns
-    known = np.isfinite(columns["width_px"]) & np.isfinite(columns["height_px"])
-    if not known.any():
-        return None
-
-    def one(name: str, what: str) -> Any:
-        found = sorted(set(columns[name][known].tolist()))
-        if len(found) > 1:
-            said = ", ".join(str(each) or "one without a name" for each in found[:5])
-            problem = f"the images are of {len(found)} {what}: {said}"
-            raise WildlabError(problem, "give each a folder of its own", field="camera")
-        return found[0]
-
-    camera, width, height = one("camera", "cameras"), one("width_px", "widths"), one("height_px", "heights")
-    focal = columns["focal_px"][known]
-    if not np.isfinite(focal).any():
-        return None
-    middle = float(np.nanmedian(focal))
-    if np.nanmax(np.abs(focal / middle - 1)) > 0.02:
-        least, most = np.nanmin(focal), np.nanmax(focal)
-        problem = f"the focal length changes from {least:.0f} to {most:.0f} px: the lens zooms"
-        raise WildlabError(problem, "give each focal length a folder of its own", field="focal_px")
-    how = Counter(str(each) for each in columns["focal_from"][known] if each).most_common(1)[0][0]
-    if how == BY_FILM:
-        film = middle * DIAGONAL_35MM / math.hypot(width, height)
-        how += f" of {film:g} mm over the diagonal, rounded to within {50 / film:.0f} %"
-    sizes = {"width_px": int(width), "height_px": int(height)}
-    return {"camera": camera, **sizes, "focal_px": middle, "how": how}
+    every = np.column_stack([columns["width_px"], columns["height_px"]])
+    known = np.isfinite(every).all(axis=1)
+    sizes = np.unique(every[known], axis=0)
+    if stated is not None:
+        own = (stated.width_px, stated.height_px)
+        if len(sizes) and (sizes != own).any():
+            seen = ", ".join("{:.0f} x {:.0f}".format(*one) for one in sizes[:4])
+            return None, f"the stated camera has {own[0]} x {own[1]} px, and they have {seen}"
+        return stated, "as you stated it"
+    names = sorted({str(one) for one in columns.get("camera", np.full(len(known), ""))[known]})
+    if len(names) > 1 and focal_px is None:
+        said = ", ".join(one or "one without a name" for one in names[:5])
+        return None, f"they are of {len(names)} cameras: {said}"
+    if len(sizes) != 1:
+        return None, "they are of several sizes" if len(sizes) else "nothing says how large they are"
+    width, height = map(int, sizes[0])
+    how = "as you stated it"
+    if focal_px is None:
+        focal = columns["focal_px"][known]
+        if not np.isfinite(focal).any():
+            return None, "no tag has the focal length in pixels"
+        focal_px = float(np.nanmedian(focal))
+        if np.nanmax(np.abs(focal / focal_px - 1)) > 0.02:
+            least, most = np.nanmin(focal), np.nanmax(focal)
+            return None, f"the focal length changes from {least:.0f} to {most:.0f} px: the lens zooms"
+        how = Counter(str(each) for each in columns["focal_from"][known] if each).most_common(1)[0][0]
+        if how == BY_FILM:
+            film = focal_px * DIAGONAL_35MM / math.hypot(width, height)
+            how += f" of {film:g} mm over the diagonal, rounded to within {50 / film:.0f} %"
+    camera = CameraPart(
+        name=(names[0] if len(names) == 1 else "") or "not stated",
+        width_px=width,
+        height_px=height,
+        fx_px=focal_px,
+        fy_px=focal_px,
+        cx_px=(width - 1) / 2,
+        cy_px=(height - 1) / 2,
+    )
+    how = f"{width} x {height} px, focal length {focal_px:.0f} px ({how})"
+    return camera, f"{how}; a central principal point, no distortion"

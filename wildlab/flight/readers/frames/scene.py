@@ -195,8 +195,6 @@ def problem_of(image: NDArray[Any], valid: Mask) -> str:
 #: pixels. Closed shutters give 0.8 to 1.3 (also after gain control and JPEG); the 1310 real frames at hand
 #: 106 and more; an even sea under the vignetting of a lens 180 and more.
 BLOCK, MOST_RATIO, FEWEST_BLOCKS = 16, 2.0, 16
-#: The same in a sample of every fourth row and column, where those real frames still give 5 and more.
-SAMPLED, SAMPLED_RATIO = 4, 3.0
 #: px: side of the squares whose mean may lie off by so many standard deviations of independent pixels, and to
 #: how many a single pixel counts. A dead pixel moves such a mean by one, a warm body of 3 px by nine.
 SMALL, STANDS_OUT, CLIPPED_AT = 5, 7.0, 5.0
@@ -228,19 +226,11 @@ def is_shutter(image: NDArray[Any], valid: Mask) -> bool:
     [True, False]
     """
     grey = image if image.ndim == 2 else image[..., 1]
-    # A sample rules out nearly all images, at a tenth of the time.
-    few = (slice(None, None, SAMPLED), slice(None, None, SAMPLED))
-    if not _is_even(grey[few], valid[few], BLOCK // SAMPLED, SAMPLED_RATIO):
-        return False
-    return _is_even(grey, valid, BLOCK, MOST_RATIO)
-
-
-def _is_even(image: NDArray[Any], valid: Mask, side: int, most_ratio: float) -> bool:
-    rows, columns = (length // side for length in image.shape)
+    rows, columns = (length // BLOCK for length in grey.shape)
     if rows * columns < FEWEST_BLOCKS:
         return False
-    cut = (slice(rows * side), slice(columns * side))
-    grey, valid = image[cut].astype(np.float32), valid[cut]
+    cut = (slice(rows * BLOCK), slice(columns * BLOCK))
+    grey, valid = grey[cut].astype(np.float32), valid[cut]
     whole = cv2.resize(valid.astype(np.float32), (columns, rows), interpolation=cv2.INTER_AREA) == 1
     if whole.sum() < FEWEST_BLOCKS:
         return False
@@ -250,7 +240,7 @@ def _is_even(image: NDArray[Any], valid: Mask, side: int, most_ratio: float) -> 
     means = cv2.resize(grey, (columns, rows), interpolation=cv2.INTER_AREA)[whole]
     squares = cv2.resize(grey * grey, (columns, rows), interpolation=cv2.INTER_AREA)[whole]
     inside = float(np.mean(squares - means**2))
-    if inside <= 0 or means.var() >= most_ratio * inside / side**2:
+    if inside <= 0 or means.var() >= MOST_RATIO * inside / BLOCK**2:
         return False
     return bool(np.abs(cv2.blur(grey, (SMALL, SMALL))).max() < STANDS_OUT * np.sqrt(inside) / SMALL)
 
