@@ -37,7 +37,7 @@ from wildlab.flight.card_items import (
 from wildlab.flight.files import dump_toml, is_safe_name, printable, read_toml
 from wildlab.flight.importing import import_flight
 from wildlab.flight.manifest import CameraPart, TerrainSays
-from wildlab.flight.readers.clicks import note_of_kinds
+from wildlab.flight.readers.labels import note_of_kinds
 from wildlab.flight.readers.log import PARTS, RawLog, Stream
 from wildlab.flight.readers.photos import camera_of
 from wildlab.flight.schema import QUATERNION
@@ -182,7 +182,7 @@ class Proposal:
                 role = one.role + (f" {one.target}" if one.target else "")
                 lines.append(_comment(f"{one.item.shown}: {role} ({one.why})"))
         lines += map(_comment, self.notes)
-        return "\n".join(lines) + "\n\n" + dump_toml(self.data, inline=True)
+        return "\n".join(lines) + "\n\n" + dump_toml(self.data)
 
     def _only(self, role: str) -> Choice | None:
         """The one thing of a role that only one can have; of several the one with the most rows."""

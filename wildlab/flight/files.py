@@ -350,10 +350,8 @@ def _model_in(annotation: Any) -> type[BaseModel] | None:
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
-def dump_toml(data: Mapping[str, Any], *, inline: bool = False) -> str:
-    """TOML text of nested mappings.
-
-    With `inline`, mappings of plain values inside others stand on one line, as people write recipes.
+def dump_toml(data: Mapping[str, Any]) -> str:
+    """TOML text of nested mappings; those of plain values inside others stand on one line.
 
     Values are strings, booleans, integers, finite floats, dates, times, and lists of these; a list of
     mappings is written as an array of tables. Keys whose value is None are left out: TOML has no null.
@@ -366,16 +364,16 @@ def dump_toml(data: Mapping[str, Any], *, inline: bool = False) -> str:
         For any other kind of value.
     """
     lines: list[str] = []
-    _table(data, (), lines, inline)
+    _table(data, (), lines)
     return "\n".join(lines).strip("\n") + "\n"
 
 
-def _table(data: Mapping[str, Any], path: tuple[str, ...], lines: list[str], inline: bool) -> None:
+def _table(data: Mapping[str, Any], path: tuple[str, ...], lines: list[str]) -> None:
     below = []
     for key, value in data.items():
         if value is None:
             continue
-        if inline and path and _is_plain(value):
+        if path and _is_plain(value):
             lines.append(f"{_key(key)} = {_value(value)}")
         elif isinstance(value, Mapping) or (
             isinstance(value, list | tuple) and value and all(isinstance(item, Mapping) for item in value)
@@ -391,7 +389,7 @@ def _table(data: Mapping[str, Any], path: tuple[str, ...], lines: list[str], inl
             else [(item, f"[[{name}]]") for item in value]
         ):
             lines += ["", header]
-            _table(item, (*path, key), lines, inline)
+            _table(item, (*path, key), lines)
 
 
 def _is_plain(value: Any) -> bool:

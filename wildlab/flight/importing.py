@@ -17,6 +17,7 @@ from pydantic import BaseModel
 from wildlab.errors import WildlabError
 from wildlab.flight.calibration_files import read_camera, read_learnt, refuse_other_camera
 from wildlab.flight.checks.check import find
+from wildlab.flight.checks.findings import part_of
 from wildlab.flight.clocks import between, poses_at
 from wildlab.flight.files import TOML_LIMIT, check_model, inside
 from wildlab.flight.manifest import (
@@ -319,26 +320,23 @@ def _manifest(
 
 def _refuse_problems(flight: Flight, recipe: Recipe, folder: Path) -> None:
     """Raise the first problem that `check_flight` finds, in terms of the raw file it comes from."""
+    blocks: dict[str, list[Any]] = {
+        **{name: [one] for name, one in recipe.on_board.items()},
+        **{f"nav/{name}": [one] for name, one in recipe.poses.items()},
+        "frames": [] if recipe.frames is None else [recipe.frames],
+        "truth": [*recipe.truth],
+        "detections": [*recipe.detections],
+    }
     for finding in find(flight, meaning=False):
         if finding.level != "problem":
             continue
-        sensor = recipe.on_board.get(finding.table)
-        if sensor is not None:
-            part, files = finding.table, [sensor.file]
-        elif finding.table.startswith("nav/"):
-            name = finding.table.removeprefix("nav/")
-            part, files = f"poses.{name}", [recipe.poses[name].file]
-        elif finding.table == "frames":
-            part, files = "frames", [recipe.frames.file] if recipe.frames else []
-        else:
-            blocks = recipe.truth if finding.table == "truth" else recipe.detections
-            part, files = finding.table, [block.file for block in blocks]
-            if finding.code == "all-truth-far":  # either may be the wrong one
-                part, files = "poses] or [truth", [*(one.file for one in recipe.poses.values()), *files]
+        part, used = part_of(finding.table), blocks.get(finding.table, [])
+        if finding.code == "all-truth-far":  # either may be the wrong one
+            part, used = "poses] or [truth", [*recipe.poses.values(), *used]
         raise WildlabError(
             finding.clause,
             finding.remedy,
-            file=" and ".join(dict.fromkeys(str(folder / _file(recipe, name)) for name in files)),
+            file=" and ".join(dict.fromkeys(str(folder / _file(recipe, one.file)) for one in used)),
             field=f"{finding.field} (from [{part}])",
         )
 

@@ -23,6 +23,7 @@ from wildlab.flight.raw_files import (
     texts,
     times,
 )
+from wildlab.flight.readers.log import named
 from wildlab.flight.recipes import (
     FORMS,
     Attitude,
@@ -95,16 +96,6 @@ class LocalFrame:
         return enu_to_ned(np.column_stack([a, b, c - off]))
 
 
-def ned_columns(position: Array) -> dict[str, Array]:
-    """Positions (N, 3) in n as columns of a flight."""
-    return dict(zip(POSITION, position.T, strict=True))
-
-
-def velocity_columns(velocity: Array) -> dict[str, Array]:
-    """Velocities (N, 3) in n as columns of a flight."""
-    return dict(zip(VELOCITY, velocity.T, strict=True))
-
-
 @dataclass(frozen=True)
 class Rows:
     """One table without its times and places.
@@ -131,7 +122,7 @@ class Rows:
 
     def table(self, time_s: Array, position: Array | None) -> pd.DataFrame:
         """The table of the flight, with positions (N, 3) in n where it has any."""
-        placed = {} if position is None else ned_columns(position)
+        placed = {} if position is None else named(POSITION, position.T)
         return pd.DataFrame({"time_s": time_s} | placed | self.columns)
 
 
@@ -235,9 +226,9 @@ def read_poses(recipe: Recipe, block: Poses, table: RawTable, part: str, ids: Te
         velocity = None if velocity is None else velocity[first]
         spreads = None if spreads is None else spreads[first]
     rotation = _rotation(attitude, block.attitude)
-    columns: dict[str, Any] = dict(zip(QUATERNION, matrix_to_quaternion(rotation).T, strict=True))
+    columns: dict[str, Any] = named(QUATERNION, matrix_to_quaternion(rotation).T)
     if velocity is not None:
-        columns |= velocity_columns(velocity)
+        columns |= named(VELOCITY, velocity.T)
     if ids is not None:
         columns["frame_id"] = ids
     if spreads is not None:
@@ -414,7 +405,7 @@ def read_sensors(recipe: Recipe, raw: RawFiles) -> dict[str, Rows]:
         if isinstance(block, Satellite):
             position = read_position(rows, block.position, "gnss.position")
             if block.velocity is not None:
-                columns = velocity_columns(read_velocity(rows, block.velocity, "gnss.velocity"))
+                columns = named(VELOCITY, read_velocity(rows, block.velocity, "gnss.velocity").T)
         columns |= read_columns(rows, block, name, ON_BOARD[name], may_be_empty=name == "gnss")
         for key in ("satellites", "fix") if isinstance(block, Satellite) else ():
             if (column := getattr(block, key)) is not None:
@@ -548,7 +539,7 @@ def read_detections(
         columns["v_px"] = numbers(rows, block.pixel.v, "pixel", f"{part}.pixel.v", image=image)
     elif block.position is not None:
         position = places.ned(read_position(rows, block.position, f"{part}.position"), "positions")
-        columns |= ned_columns(position)
+        columns |= named(POSITION, position.T)
     elif block.azimuth is not None:
         azimuth = numbers(rows, block.azimuth, "angle", f"{part}.azimuth")
         if block.counts_from == "bow":
@@ -623,5 +614,5 @@ def read_truth(
         time_s = (times(rows, block.time, f"{part}.time", recipe.time.zone, recipe.time.epoch) - start) / 1e9
     position = places.ned(read_position(rows, block.position, f"{part}.position"), "truth")
     columns: dict[str, Text | Array] = {"target_id": names, "time_s": time_s}
-    columns |= ned_columns(position) | read_columns(rows, block, part, _SPREADS, may_be_empty=True)
+    columns |= named(POSITION, position.T) | read_columns(rows, block, part, _SPREADS, may_be_empty=True)
     return pd.DataFrame(columns)

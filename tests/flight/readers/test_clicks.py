@@ -10,7 +10,7 @@ from tests.flight.readers import made_up_photos as made
 from tests.flight.readers.tracks import near
 from wildlab.errors import WildlabError
 from wildlab.flight.readers import read_folder, read_log
-from wildlab.flight.readers.clicks import clicks_sniff
+from wildlab.flight.readers.labels import clicks_sniff
 from wildlab.flight.readers.log import RawLog
 
 HERE = Path("clicks")

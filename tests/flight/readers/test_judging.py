@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wildlab.flight.readers.log import Stream, drop_rare_heights, judge
+from wildlab.flight.readers.log import Stream, judge
 from wildlab.flight.readers.text import decode, number, numbers
 
 WORDS = ["", " 1.5", "-2", "+.5", "1e3", "1_0", "nan", "inf", "1e999", "0x10", "1,5", "٣", "=1+1", "1" * 100]
@@ -88,8 +88,3 @@ def test_degrees_of_longitude_are_short_up_north():
             "gnss", Stream({"time_s": time, "latitude_deg": np.full(30, 80.0), "longitude_deg": longitude})
         )
         assert found["impossible jump"].any() != flown
-
-
-def test_heights_that_few_rows_have_are_left_out():
-    columns = {"height_sea_m": np.array([1.0, np.nan, np.nan]), "undulation_m": np.ones(3)}
-    assert len(drop_rare_heights(columns)) == 1 and columns == {}

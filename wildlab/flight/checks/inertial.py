@@ -30,6 +30,7 @@ from wildlab.flight.checks.findings import (
     say,
     shift_clock,
 )
+from wildlab.flight.checks.known_points import best_of
 from wildlab.flight.clocks import gnss_times
 from wildlab.flight.schema import FORCE, POSITION, QUATERNION, RATE, SECOND_COLUMNS, VELOCITY
 from wildlab.flight.store import Flight
@@ -252,8 +253,8 @@ IMU_GAP_S = 0.5
 OUTAGE_S = 5.0
 #: Less of the shorter log than this in common, the clocks are in doubt.
 COMMON = 0.5
-#: How far apart clocks are looked for, how finely, and from which offset on it is worth saying.
-LAG_S, COARSE_S, FINE_S, OFFSET_S = 60.0, 0.25, 0.02, 0.4
+#: How far apart clocks are looked for, how coarsely, and from which offset on it is worth saying.
+LAG_S, COARSE_S, OFFSET_S = 60.0, 0.25, 0.4
 #: Correlation that makes an offset believable, how much less it has to leave unexplained (as a ratio of
 #: variances) than no offset, and by what logarithm of the likelihood it has to be the better explanation.
 ALIKE, BETTER, SURE = 0.6, 1.2, 10.0
@@ -336,9 +337,8 @@ def _offset(flight: Flight, imu: Inertial, moved: Moves) -> Iterator[Finding]:
     high = np.flatnonzero(np.nan_to_num(found, nan=-1.0) > np.nanmax(found) - ROUNDS)
     peaks = [i for i in high if found[i] == np.nanmax(found[max(0, i - 8) : i + 9])]
     middle = coarse[min(peaks, key=lambda i: abs(coarse[i]))]
-    fine = np.arange(middle - COARSE_S, middle + COARSE_S + FINE_S / 2, FINE_S)
-    near = np.array([alike(lag) for lag in fine])
-    best, most = float(fine[np.nanargmax(near)]), float(np.nanmax(near))
+    best = best_of(lambda lag: -alike(lag), middle + COARSE_S * np.array([-1.0, 0.0, 1.0]))
+    most = alike(best)
     unexplained = (1 - here**2) / max(1 - most**2, 1e-12)
     # Overlapping intervals count once.
     likelier = float(np.sum(np.diff(moved.start, append=moved.end[-1]).clip(max=STEP_S))) / STEP_S

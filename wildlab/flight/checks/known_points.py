@@ -296,12 +296,9 @@ def robust_scale(size: Array) -> float:
     return float(np.median(size)) / 1.1774 if len(size) else float("nan")
 
 
-def left_over(m: Missed, fit: Mask) -> Array:
-    """Sizes (N,) of the misses less what is allowed for, in radians, by a fit to some rows.
-
-    Allowed for are a small turn of the camera and a small shift of the position: robust least squares, held
-    near zero by what is usual of both.
-    """
+def constant_of(m: Missed, fit: Mask, allowed: Array) -> tuple[Array, Array]:
+    """A small turn of the camera and a small shift of the position (6,), by robust least squares over some
+    rows, held near zero by what is allowed of both; and how misses grow with them (N, 3, 6)."""
     shift = np.cross(np.swapaxes(m.R_nc, 1, 2), m.towards[:, :, None], axisa=1, axisb=1, axisc=1)
     J = np.concatenate([m.across, shift / np.maximum(m.distance, 1.0)[:, None, None]], axis=2)
     e, expected, rows = m.turn[fit], m.expected[fit], J[fit]
@@ -310,8 +307,14 @@ def left_over(m: Missed, fit: Mask) -> Array:
         size = np.linalg.norm(e - rows @ value, axis=1)
         scale = np.maximum(robust_scale(size), expected / 3)
         weight = 1 / (1 + (size / (2 * scale)) ** 2) / scale**2
-        A = np.einsum("nia,n,nib->ab", rows, weight, rows) + np.diag(ALLOWED**-2.0)
+        A = np.einsum("nia,n,nib->ab", rows, weight, rows) + np.diag(allowed**-2.0)
         value = np.linalg.solve(A, np.einsum("nia,n,ni->a", rows, weight, e))
+    return value, J
+
+
+def left_over(m: Missed, fit: Mask) -> Array:
+    """Sizes (N,) of the misses less what is allowed for, in radians, by a fit to some rows."""
+    value, J = constant_of(m, fit, ALLOWED)
     return np.asarray(np.linalg.norm(m.turn - J @ value, axis=1))
 
 
@@ -377,7 +380,8 @@ CLOCKS = np.sinh(np.linspace(-5.0, 5.0, 41)) * 0.8
 HOURS = tuple(h for h in np.arange(-14.0, 14.25, 0.25) if h)
 LEAP_S = (18.0, -18.0, 19.0, -19.0, 37.0, -37.0)
 #: A mount is off by a few degrees and no wrong meaning; beyond the second, a turn is one of the usual ones.
-TURNED_DEG, LARGEST_TURN_DEG, REFITS = 5.0, 40.0, 6
+TURNED_DEG, LARGEST_TURN_DEG = 5.0, 40.0
+ALLOWED_TURN = np.array([1.0] * 3 + [1e-6] * 3)
 #: A lever arm is no longer than this, m.
 LONGEST_LEVER = 5.0
 
@@ -645,11 +649,7 @@ def height_mistakes(s: Sightings) -> Iterator[Mistake[Sightings]]:
 def turn_mistakes(s: Sightings) -> Iterator[Mistake[Sightings]]:
     """A camera that is turned against its mount by a constant, as a tilt that was not stated."""
     m = missed(s)
-    rows, across, e = m.good, m.across[m.good], np.zeros(3)
-    for _ in range(REFITS):
-        weight = _weight(np.linalg.norm(m.turn[rows] - across @ e, axis=1))
-        A = np.einsum("nij,n->ij", across, weight) + 1e-9 * np.eye(3)
-        e = np.linalg.solve(A, np.einsum("n,ni->i", weight, m.turn[rows]))
+    e = constant_of(m, m.good, ALLOWED_TURN)[0][:3]
     size = np.degrees(np.linalg.norm(e))
     if not TURNED_DEG < size < LARGEST_TURN_DEG:
         return
@@ -662,11 +662,6 @@ def turn_mistakes(s: Sightings) -> Iterator[Mistake[Sightings]]:
     tilt, pan, roll = np.degrees(e)
     facts = {"size": size, "tilt": tilt, "pan": pan, "roll": roll}
     yield mistake(one_row("constant-turn"), turned, fitted=True, **facts)
-
-
-def _weight(size: Array) -> Array:
-    """Of misses: far ones count little, since a wrong click must not shift what all others say."""
-    return 1 / (1 + (size / (2 * max(np.median(size), 1e-9))) ** 2)
 
 
 def clock_mistakes(s: Sightings, offset_s: float) -> Iterator[Mistake[Sightings]]:

@@ -33,14 +33,13 @@ HEAD = 8192
 
 
 class Format(NamedTuple):
-    """A format: where its functions are, what it is called in sentences, and whether it is a track.
+    """A format: where its functions are, and what it is called in sentences.
 
     `start`: what the names of its functions begin with, where a module has several formats.
     """
 
     module: str
     called: str
-    track: bool = False
     start: str = ""
 
     def function(self, name: str) -> Any:
@@ -54,17 +53,17 @@ FORMATS: dict[str, Format] = {
     "dataflash-text": Format("ardupilot", "ArduPilot DataFlash log as text", start="text_"),
     "ulog": Format("telemetry", "PX4 ULog", start="ulog_"),
     "tlog": Format("telemetry", "MAVLink telemetry log", start="tlog_"),
-    "ubx": Format("tracks", "u-blox UBX", track=True, start="ubx_"),
-    "gpx": Format("tracks", "GPX track", track=True, start="gpx_"),
-    "dji-srt": Format("dji", "DJI subtitles", track=True, start="srt_"),
-    "dji-mrk": Format("dji", "DJI time stamps of images", track=True, start="mrk_"),
-    "airdata": Format("dji", "AirData table", track=True, start="airdata_"),
-    "rtklib-pos": Format("tracks", "RTKLIB positions", track=True, start="pos_"),
-    "nmea": Format("tracks", "NMEA 0183", track=True, start="nmea_"),
+    "ubx": Format("tracks", "u-blox UBX", start="ubx_"),
+    "gpx": Format("tracks", "GPX track", start="gpx_"),
+    "dji-srt": Format("dji", "DJI subtitles", start="srt_"),
+    "dji-mrk": Format("dji", "DJI time stamps of images", start="mrk_"),
+    "airdata": Format("dji", "AirData table", start="airdata_"),
+    "rtklib-pos": Format("tracks", "RTKLIB positions", start="pos_"),
+    "nmea": Format("tracks", "NMEA 0183", start="nmea_"),
     "marks-kml": Format("vector", "KML placemarks", start="kml_"),
     "marks-geojson": Format("vector", "GeoJSON points", start="geojson_"),
     "marks-csv": Format("vector", "table of surveyed points", start="table_"),
-    "clicks": Format("clicks", "clicks or boxes in images", start="clicks_"),
+    "clicks": Format("labels", "clicks or boxes in images", start="clicks_"),
 }
 
 
@@ -98,7 +97,7 @@ def read_log(path: Path, data: bytes, format_: str, zone: str | None = None) -> 
     """
     one = FORMATS[format_]
     try:
-        return judge_log(one.function("decode")(path, data, zone), one.track)
+        return judge_log(one.function("decode")(path, data, zone))
     except RecursionError:
         raise WildlabError("is nested too deeply to be read", "copy the file again", file=path) from None
 
@@ -106,7 +105,7 @@ def read_log(path: Path, data: bytes, format_: str, zone: str | None = None) -> 
 #: Formats of whole folders, by their names in recipes.
 FOLDERS: dict[str, Format] = {
     "photos": Format("photos", "folder of images", start="folder_"),
-    "clicks-yolo": Format("clicks", "folder of YOLO's labels", start="folder_"),
+    "clicks-yolo": Format("labels", "folder of YOLO's labels", start="folder_"),
 }
 #: So much of the beginning of each file goes into a folder's checksum: images are large and many.
 HASHED = 65536
@@ -135,7 +134,7 @@ def read_folder(folder: Path, format_: str, zone: str | None = None) -> tuple[Ra
     """
     if not folder.is_dir():
         raise WildlabError("there is no such folder", "check the name, and the source folder", file=folder)
-    log = judge_log(FOLDERS[format_].function("decode")(folder, zone), False)
+    log = judge_log(FOLDERS[format_].function("decode")(folder, zone))
     digest = hashlib.sha256()
     for path in sorted(folder.rglob("*")):
         if path.is_file() and not path.is_symlink():

@@ -1,18 +1,18 @@
 """Labels of images as a detector is judged by them, and clicks in images as a log: COCO, MegaDetector, CVAT,
 tables, YOLO.
 
-The format is known by the content: COCO's truth has ``images``, ``annotations`` and ``categories``, its
-results are a list with ``image_id``, ``bbox`` and ``score``, and MegaDetector's ``images`` have ``file`` and
-``detections``. As clicks a box stands for its middle. Programs that give shares of an image want its size,
-which is that of the images that lie beside; without one such rows say so and are not used.
+The format is known by the content. As clicks a box stands for its middle. Programs that give shares of an
+image want its size, that of the images beside; without one such rows say so and are not used.
 """
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import islice
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any
 
@@ -23,14 +23,22 @@ from pydantic import BaseModel, Field, RootModel
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import check_model, printable, read_regular, unreadable
+from wildlab.flight.readers.frames.image import SUFFIXES
+from wildlab.flight.readers.log import RawLog, Stream, holding, named
+from wildlab.flight.readers.photos import read_tags, size_of
 from wildlab.flight.readers.text import (
     Identity,
     Real,
     Several,
+    header_of,
+    number,
     numbers,
     parse_json,
+    parse_xml,
     plain,
+    plural,
     read_text_table,
+    told,
 )
 from wildlab.geometry.frames import Array, Mask
 
@@ -140,17 +148,7 @@ class Labels:
         return found
 
     def name_of(self, frame: str) -> str | None:
-        """The name that the file has for a frame, None where it does not name it.
-
-        Parameters
-        ----------
-        frame
-            `wildlab.flight.readers.frames.Frame.name`.
-
-        Returns
-        -------
-        str or None
-        """
+        """The name that the file has for a frame, None where it does not name it."""
         stem = frame if self.marked.by == "number" else Path(frame).stem
         number = stem.rpartition("#")[2]
         by_number = self.marked.by != "name"
@@ -166,25 +164,7 @@ class Labels:
         return None
 
     def boxes_of(self, frame: str, name: str, width: int, height: int) -> tuple[Array, Array]:
-        """What is marked in a frame, and where it is not judged, in px.
-
-        Parameters
-        ----------
-        frame, name
-            Of the frame, and what `name_of` calls it.
-        width, height
-            Of the frame, px; 0 where it could not be read.
-
-        Returns
-        -------
-        (N, 4), (I, 4)
-            Left, top, width, height, px.
-
-        Raises
-        ------
-        WildlabError
-            Where the file says that the frame is of another size.
-        """
+        """What is marked in a frame, and where it is not judged, in px."""
         given = self.marked.sizes.get(name)
         if given is not None and width and given != (width, height):
             raise WildlabError(
@@ -206,52 +186,13 @@ def read_labels(
 ) -> Labels:
     """Labels, or what another detector found, out of a file or folder whose format is known by its content.
 
-    Parameters
-    ----------
-    path
-        A CSV table, JSON of COCO (truth or results) or of MegaDetector, or a folder of YOLO's text files.
-    classes
-        Which classes are looked for; all others are then regions that are not judged. Empty: all.
-    group
-        Column (or field of COCO's images) that says what frames belong together, as those of one clip; folds
-        never split these.
-    truth
-        Labels of the same images, whose ids the results of COCO have.
-
-    Returns
-    -------
-    Labels
-
-    Raises
-    ------
-    WildlabError
-        Where the file cannot be read, lacks something or holds something that cannot be used, or where no
-        label is of a class that is looked for.
-    """
+    Things of other `classes` (empty: of none) are regions that are not judged; `group` is the column, or
+    field of COCO's images, of what frames belong together; `truth` has the ids that results of COCO name."""
     return choose_classes(_read(path, group, None if truth is None else truth.marked), path, classes)
 
 
 def choose_classes(marked: Marked, path: Path, classes: tuple[str, ...] = ()) -> Labels:
-    """Labels of some classes out of what a file holds.
-
-    Parameters
-    ----------
-    marked
-        All of it.
-    path
-        Of the file.
-    classes
-        Which are looked for; all others are then regions that are not judged. Empty: all.
-
-    Returns
-    -------
-    Labels
-
-    Raises
-    ------
-    WildlabError
-        Where no label is of a class that is looked for, or a frame has too many boxes.
-    """
+    """Labels of some classes out of what a file holds."""
     unknown = sorted(set(classes) - set(marked.known_kinds))
     if unknown:
         there = ", ".join(printable(one) for one in sorted(set(marked.known_kinds))[:20])
@@ -348,10 +289,6 @@ class Truth(BaseModel):
     annotations: Several[Annotation]
 
 
-class Results(RootModel[Several[Result]]):
-    """COCO's results."""
-
-
 class Found(BaseModel):
     """What MegaDetector found."""
 
@@ -378,28 +315,7 @@ class Batch(BaseModel):
 def read_json_boxes(
     data: bytes, path: Path, *, group: str | None = None, truth: Marked | None = None
 ) -> Marked:
-    """Boxes out of a JSON file of one of the three formats.
-
-    Parameters
-    ----------
-    data
-        The file's content.
-    path
-        For messages.
-    group
-        Field of COCO's images that says what belongs together; None where that is not asked for.
-    truth
-        COCO's truth of the same images, whose ids results have; None takes an id for the name of a file.
-
-    Returns
-    -------
-    Marked
-
-    Raises
-    ------
-    WildlabError
-        Where it is no JSON, of none of the formats, or something in it is wrong: with its place.
-    """
+    """Boxes out of a JSON file of one of the three formats."""
     found = parse_json(data, path, "the JSON that it begins like")
     keys = set(found) if isinstance(found, dict) else set()
     if {"images", "annotations"} <= keys:
@@ -409,7 +325,7 @@ def read_json_boxes(
     if group is not None:
         raise WildlabError("says nothing of groups", "leave --group out", file=path, field=group)
     if isinstance(found, list):
-        return _results(check_model(Results, found, path).root, path, truth)
+        return _results(check_model(RootModel[Several[Result]], found, path).root, path, truth)
     if batch or {"images", "detection_categories"} <= keys:
         return _megadetector(check_model(Batch, found, path), path)
     raise WildlabError(
@@ -579,28 +495,9 @@ def way_of(names: list[str], clicks: bool) -> tuple[str, ...] | None:
 def read_table(data: bytes, path: Path, *, group: str | None = None, clicks: bool = False) -> Marked:
     """Boxes and points out of a table of text with one row for each thing.
 
-    Parameters
-    ----------
-    data
-        The file's content: a column names the image (`IMAGE_COLUMNS`) or numbers the clip's frame
-        (``frame0``), others are a box or a point in px (`WAYS`), and perhaps the class and a score. A row
-        without numbers is an empty frame.
-    path
-        For messages.
-    group
-        Column that says what frames belong together; None where that is not asked for.
-    clicks
-        Rows that are wrong stay, as NaN; without it they are refused. A point goes before a box, and what
-        names a thing before its class.
-
-    Returns
-    -------
-    Marked
-
-    Raises
-    ------
-    WildlabError
-        Where the table cannot be read, lacks a column, has no row, or has one that cannot be used.
+    A column names the image (`IMAGE_COLUMNS`) or numbers the clip's frame (``frame0``), others are a box or a
+    point in px (`WAYS`), and perhaps the class and a score. A row without numbers is an empty frame. Of
+    `clicks` wrong rows stay, as NaN; of labels they are refused.
     """
     table = read_text_table(data, path)
     bare, header = bare_names(table.header), table.header
@@ -705,22 +602,6 @@ MOST_OF_NAMES = 200_000
 def read_yolo_folder(path: Path) -> Marked:
     """Boxes out of a folder of text files that are called as the images are: a line for each thing, ``class
     cx cy w h [score]``.
-
-    Parameters
-    ----------
-    path
-        Folder. An empty file is an image in which nothing is; an image without a file is not spoken of.
-
-    Returns
-    -------
-    Marked
-        Boxes in shares of the image; classes by the names in ``classes.txt`` or ``data.yaml`` where there is
-        one, else their numbers.
-
-    Raises
-    ------
-    WildlabError
-        Where there is no such file, too many of them, or a line is wrong: with file and line.
     """
     try:
         files = sorted(
@@ -762,11 +643,6 @@ def _line(words: list[str], names: dict[int, str], path: Path, where: str) -> tu
 def class_names(folder: Path) -> dict[int, str]:
     """Names of classes by their numbers, from ``classes.txt`` or ``data.yaml``, whichever lies nearest to a
     folder of text files; empty where there is neither.
-
-    Raises
-    ------
-    WildlabError
-        Where such a file is there and its names cannot be read.
     """
     for place in [folder, *folder.resolve().parents][: 1 + ABOVE]:
         for name in (NAMES, *DATA):
@@ -794,3 +670,131 @@ def _yaml_names(text: str, path: Path) -> dict[int, str]:
         fix = f"write them into a {NAMES}, one a line"
         raise WildlabError("a list of names is wanted", fix, file=path, field="names")
     return {at: printable(str(one)) for at, one in named.items()}
+
+
+# -- clicks as a log
+
+#: Attributes of CVAT that name a thing more closely than its label.
+ATTRIBUTES = frozenset({"name", "target", "target_id", "id", "marker"})
+#: Letters of a name at most.
+MOST_LETTERS = 200
+
+
+def clicks_sniff(head: bytes) -> bool:
+    """Whether a file is one of the known kinds, by its content."""
+    start = head.lstrip(b"\xef\xbb\xbf \r\n\t")
+    if start[:1] in (b"{", b"["):
+        words = (b'"annotations"', b'"detection_categories"', b'"detections"', b'"bbox"', b'"file_name"')
+        return any(one in head for one in words)
+    if start[:1] == b"<":
+        return b"<annotations" in head and re.search(b"<(image|meta|version)", head) is not None
+    names = bare_names(header_of(head))
+    return bool(set(bare_names(IMAGE_COLUMNS)) & set(names)) and way_of(names, clicks=True) is not None
+
+
+def clicks_decode(path: Path, data: bytes, zone: str | None) -> RawLog:
+    """Clicks and boxes of one file; images whose sizes are wanted lie beside it."""
+    start = data.lstrip(b"\xef\xbb\xbf \r\n\t")[:1]
+    if start in (b"{", b"["):
+        return _decoded(read_json_boxes(data, path), path, path.parent)
+    return _decoded(_cvat(data, path) if start == b"<" else read_table(data, path, clicks=True), path, path)
+
+
+def folder_decode(folder: Path, zone: str | None) -> RawLog:
+    """Boxes of a folder of YOLO's text files, one for each image, whose name without the ending they have."""
+    return _decoded(read_yolo_folder(folder), folder, folder)
+
+
+def note_of_kinds(clicks: Stream, shown: str) -> str:
+    """A sentence where names are of kinds, not of single things: one stands twice in an image; else "".
+
+    A surveyed point that was clicked twice is one point all the same: ask where none is surveyed.
+    """
+    pairs = zip(clicks.columns["image"], clicks.columns.get("name", ()), strict=False)
+    kind = next((name for (_, name), count in Counter(pairs).items() if name and count > 1), "")
+    said = f"{shown}: {kind!r} stands twice in one image, so names are of kinds and name no target"
+    return f"{said}: track them by wildlab track --many." if kind else ""
+
+
+def _decoded(marked: Marked, path: Path, folder: Path) -> RawLog:
+    crowd = marked.table["crowd"].astype(bool)
+    table = marked.table[~crowd]
+    if not len(table):
+        raise WildlabError("marks nothing", "give a file with boxes or points", file=path)
+    names, boxes = table["name"].tolist(), table[SIDES].to_numpy(float)
+    without = 0
+    if marked.relative:
+        sizes = sizes_beside(folder, names)
+        known = np.array([sizes.get(one, (np.nan, np.nan)) for one in names], float)
+        boxes = boxes * np.tile(known, 2)
+        without = int(np.isnan(known).any(axis=1).sum())
+    notes = {
+        f"{marked.format}: {plural(len(table), 'box')}": marked.counted_in == "box",
+        f"{without} of {len(table)} boxes are of images of unknown size": without,
+        "images are known by ids alone": marked.by == "id",
+    }
+    # One without extent is a point.
+    box = np.where((boxes[:, 2:] > 0).any(axis=1, keepdims=True), boxes, np.nan)
+    columns: dict[str, Any] = {
+        "image": [one[:MOST_LETTERS] for one in names],
+        "name": [printable(one[:MOST_LETTERS]) for one in table["kind"]],
+        "u_px": boxes[:, 0] + boxes[:, 2] / 2,
+        "v_px": boxes[:, 1] + boxes[:, 3] / 2,
+        "score": table["score"].to_numpy(float),
+        **named(("box_u_px", "box_v_px", "box_width_px", "box_height_px"), box.T),
+    }
+    unusable = {
+        "no place in the image": ~np.isfinite(columns["u_px"] + columns["v_px"]),
+        "no image": np.array([not one for one in names], bool),
+    }
+    lost = [(count, "thing", f"left out: {what}") for what, count in marked.left_out.items()]
+    lost.append((int(crowd.sum()), "region", "of many that are not told apart"))
+    part = Stream(columns, table["row"], marked.counted_in, unusable)
+    return RawLog({"clicks": part}, lost=told(*lost), notes=holding(notes))
+
+
+def sizes_beside(folder: Path, names: Iterable[str]) -> dict[str, tuple[float, float]]:
+    """Width and height of images, px, out of their headers: of those below the folder of the labels, in
+    ``images`` beside it, or in one for a ``labels`` above it, as programs that train detectors have them."""
+    swapped = Path(*("images" if one == "labels" else one for one in folder.parts))
+    listed: dict[str, Path] = {}
+    for place in (swapped, folder.parent / "images", folder):
+        for one in islice(place.rglob("*"), MOST_FILES):
+            if one.suffix.lower() in SUFFIXES:
+                listed |= {one.stem: one, one.name: one}
+    found = {}
+    for name in dict.fromkeys(names):
+        plain = plain_path(name)
+        path = listed.get(plain.name) or listed.get(plain.stem)
+        size = (0, 0) if path is None else size_of(read_tags(path))
+        if all(size):
+            found[name] = (float(size[0]), float(size[1]))
+    return found
+
+
+def _cvat(data: bytes, path: Path) -> Marked:
+    """Boxes and points of CVAT's format for images, 1.1."""
+    left_out: Counter[str] = Counter()
+    rows: list[tuple[Any, ...]] = []
+    for image in parse_xml(data, path).iter("image"):
+        for shape in image:
+            named = [
+                (one.text or "").strip()
+                for one in shape.iter("attribute")
+                if one.get("name", "").strip().lower() in ATTRIBUTES
+            ]
+            name = next((one for one in reversed(named) if one), shape.get("label", ""))
+            places: list[tuple[float, ...]] = []
+            if shape.tag == "box":
+                left, top, right, bottom = (number(shape.get(one)) for one in ("xtl", "ytl", "xbr", "ybr"))
+                places = [(left, top, right - left, bottom - top)]
+            elif shape.tag == "points":
+                pairs = (one.partition(",") for one in shape.get("points", "").split(";"))
+                places = [(number(u), number(v), 0.0, 0.0) for u, _, v in pairs]
+            elif shape.tag != "tag":
+                left_out[f"shape {printable(shape.tag[:40])}"] += 1
+            rows += [(image.get("name", ""), one, name, np.nan, False) for one in places]
+    if not rows:
+        fix = "export the task as CVAT for images 1.1"
+        raise WildlabError("has no box or point of CVAT", fix, file=path, field="image")
+    return Marked("CVAT", box_table(rows), (), (), left_out=left_out, counted_in="shape")

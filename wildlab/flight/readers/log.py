@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from wildlab.flight.clock_fitting import GPS_START_S
 from wildlab.flight.clocks import between
-from wildlab.flight.readers.text import LATEST_S, decode, plural
+from wildlab.flight.readers.text import LATEST_S, decode
 from wildlab.flight.schema import BOUNDS, FIELD, FORCE, QUATERNION, RATE, VELOCITY
 from wildlab.geometry.frames import Array, Indices, Mask, matrix_to_euler, quaternion_to_matrix
 
@@ -230,15 +230,13 @@ ONE_HEIGHT = "heights above ellipsoid and sea level are the same: they are taken
 _EARTH_M = 6371e3
 
 
-def judge_log(found: RawLog, track: bool) -> RawLog:
+def judge_log(found: RawLog) -> RawLog:
     """A log out of what its reader decoded.
 
     Parameters
     ----------
     found
         What `decode` gave.
-    track
-        Whether it is the track of a receiver: heights that few rows have are left out.
 
     Returns
     -------
@@ -249,7 +247,6 @@ def judge_log(found: RawLog, track: bool) -> RawLog:
     notes = list(found.notes)
     for name, one in parts.items():
         columns = one.columns if name in STILL else _filled(name, one)
-        notes += drop_rare_heights(columns) if track else []
         parts[name] = replace(one, columns=columns)
     if "gnss" in parts and _one_height(parts["gnss"].columns):
         notes.append(ONE_HEIGHT)
@@ -289,21 +286,6 @@ def _one_height(columns: Mapping[str, ArrayLike]) -> bool:
     apart = np.asarray(columns["height_sea_m"], float) - np.asarray(columns["height_ellipsoid_m"], float)
     known = np.isfinite(apart)
     return bool(known.any() and (apart[known] == 0).all())
-
-
-def drop_rare_heights(columns: dict[str, Array]) -> list[str]:
-    """Takes heights out of `columns` that fewer than half of the rows have; a sentence where it did.
-
-    Rows without a height would be of no use beside rows with one, and most would be lost.
-    """
-    names = [name for name in HEIGHTS if name in columns]
-    heights = [columns[name] for name in names if name != "undulation_m"]
-    known = np.isfinite(np.array(heights, float)).any(axis=0) if heights else np.zeros(0, bool)
-    if not known.any() or known.mean() >= 0.5:
-        return []
-    for name in names:
-        del columns[name]
-    return [f"only {plural(int(known.sum()), 'row')} of {len(known)} have a height: heights are left out"]
 
 
 def placed(latitude_deg: ArrayLike, longitude_deg: ArrayLike) -> Mask:
@@ -380,7 +362,7 @@ def judge(part: str, decoded: Stream) -> dict[str, Mask]:
         heights = starting("height_")
         if where and heights:
             without = ~any_of([~np.isnan(one) for one in heights], len(time))
-            if not without[~bad].all():
+            if 2 * without[~bad].sum() <= (~bad).sum():
                 add("no height", without & ~bad)
                 bad = bad | without
     _judge_order(time, have if where else {}, bad, found)

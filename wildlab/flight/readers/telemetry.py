@@ -231,11 +231,8 @@ def find_boot(frames: Telemetry, system: int, component: int) -> Boot | None:
     number, own, received = (one[order][own[order] > 0] for one in (number, own, received))
     if not len(own):
         return None
-    starts = np.r_[0, 1 + np.flatnonzero(np.diff(own) < -RESTART_S)]
-    falls = len(starts) - 1
-    if falls >= MOST_RUNS:
-        # No vehicle is switched on so often: the stamps are of no use, and one line goes under most of them.
-        starts = starts[:1]
+    # No vehicle is switched on more often: its stamps are of several clocks, and their receipts say so.
+    starts = np.r_[0, 1 + np.flatnonzero(np.diff(own) < -RESTART_S)][:MOST_RUNS]
     ends = np.r_[starts[1:], len(own)]
     told = kinds["SYSTEM_TIME"]
     unix = told.get("time_unix_usec") / 1e6
@@ -264,7 +261,6 @@ def find_boot(frames: Telemetry, system: int, component: int) -> Boot | None:
         f"the ground station received {middle} after the vehicle's UTC": from_vehicle[main],
         f"UTC is fitted along the earliest receipts; others are {middle} later": (not from_vehicle[main]),
         f"the vehicle was switched on {len(starts)} times; each run has a clock of its own": len(starts) > 1,
-        "the vehicle's stamps are of several clocks": falls >= MOST_RUNS,
     }
     return Boot(number[starts], rate, offset_s, behind, base, holding(notes))
 

@@ -14,7 +14,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import compress, islice
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -137,9 +137,7 @@ class Frames:
             With burnt-in overlays taken out of what is valid, and a problem where it is of another size than
             most.
         """
-        # A picture that is held is told by those before it.
-        early = max(first - HELD + 1, 0)
-        yield from islice(self._checked(self._read(lambda number: number >= early)), first - early, None)
+        return self._chosen(lambda number: number >= first)
 
     def some(self, numbers: Collection[int]) -> Iterator[Frame]:
         """Some of the frames; the others are not decoded.
@@ -147,17 +145,22 @@ class Frames:
         Parameters
         ----------
         numbers
-            From 0.
+            Which, counted from 0; in any order, and what there is none of is left out.
 
         Yields
         ------
         Frame
-            As of `starting_at`, in their order.
+            In the order of the sequence.
         """
-        wanted = set(numbers)
-        needed = {number - back for number in wanted for back in range(HELD) if number >= back}
-        order = (number in wanted for number in sorted(needed))
-        yield from compress(self._checked(self._read(needed.__contains__)), order)
+        return self._chosen(set(numbers).__contains__)
+
+    def _chosen(self, wanted: Callable[[int], bool]) -> Iterator[Frame]:
+        def needed(number: int) -> bool:  # a picture that is held is told by those before it
+            return any(wanted(number + more) for more in range(HELD))
+
+        for frame, number in zip(self._checked(self._read(needed)), filter(needed, count()), strict=False):
+            if wanted(number):
+                yield frame
 
     def _read(self, wanted: Callable[[int], bool]) -> Iterator[Frame]:
         if self.files:
