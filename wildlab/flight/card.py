@@ -167,10 +167,8 @@ class Proposal:
         if "poses" not in self.data and "gnss" not in self.data:
             left_out = [one for one in self.notes if one.startswith("The images are left out")]
             because = f" ({left_out[0]})" if left_out else ""
-            raise WildlabError(
-                f"nothing here says where a camera was{because}",
-                "add its log (--role FILE=own)",
-            )
+            problem = f"nothing here says where a camera was{because}"
+            raise WildlabError(problem, "add its log (--role FILE=own)")
         self.data = {key: self.data[key] for key in ORDER if key in self.data} | self.data
 
     @property
@@ -482,7 +480,7 @@ class Proposal:
         """How good poses are, where not each of them says so itself: positions by the receivers' own
         statements where there are any."""
         if any("spreads" not in one for one in self.data.get("poses", {}).values()):
-            found, stated = read_assumed("uncertainty"), []
+            found = read_assumed("uncertainty")
             for way in ("horizontal", "vertical"):
                 name = f"sd_{way}_m"
                 values = [s.columns[name][s.used] for s in self.streams.values() if name in s.columns]
@@ -490,11 +488,7 @@ class Proposal:
                 every = every[np.isfinite(every) & (every > 0)]
                 if len(every):
                     found[f"position_{way}_m"] = round(float(np.median(every)), 4)
-                    stated.append(f"position {way}")
-            if stated:
-                found["note"] = (
-                    f"{' and '.join(stated).capitalize()}: as the receiver states. The rest: " + found["note"]
-                )
+            found["note"] = f"Positions as the receivers state, where they do. The rest: {found['note']}"
             self.data["uncertainty"] = found | self.data.get("uncertainty", {})
             self.notes.append("Standard deviations that no log states are assumed: see [uncertainty].")
         if "imu" in self.data:

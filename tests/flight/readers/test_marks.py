@@ -104,7 +104,7 @@ def test_other_geometries_are_counted():
         (marks_geojson, geojson(POINTS, crs={"properties": {"name": "EPSG::25832"}}), "WGS84 is wanted"),
         (marks_csv, table(POINTS, "name,lat,lon,altitude"), "'altitude' does not"),
         (marks_csv, table(POINTS, "name,lat,lon,note"), "no column of heights"),
-        (marks_csv, table(POINTS, "Punkt;Rechtswert;Hochwert;Höhe NHN", ";"), "eastings and northings"),
+        (marks_csv, table(POINTS, "Punkt;Rechtswert;Hochwert;Höhe NHN", ";"), "no latitude"),
     ],
 )
 def test_what_is_refused(reader, data, problem):

@@ -476,21 +476,20 @@ def _true_fix(table: MessageTable) -> Mask:
 
 def _clocked(tables: dict[str, MessageTable], counted_in: str) -> tuple[ArdupilotLog, list[MessageTable]]:
     """A log with its clock by the true fixes of a receiver, and all receivers."""
-    log = ArdupilotLog(tables, counted_in, None, np.empty(0, np.int64), np.empty(0), None)
-    receivers = [one for one in log.sensors("GPS", "GPS2", "GPS3") if one.has("Lat", "Lng")]
-    receiver = next((one for one in receivers if _true_fix(one).any()), receivers[0] if receivers else None)
-    log = log._replace(receiver=receiver)
     anchor = _stamped(tables)
-    if anchor is None:
+    rows, stamps = np.empty(0, np.int64), np.empty(0)
+    if anchor is not None:
+        kept = in_order(anchor[1])
+        rows, stamps = anchor[0].rows[kept], anchor[1][kept]
+    log = ArdupilotLog(tables, counted_in, None, rows, stamps, None)
+    receivers = [one for one in log.sensors("GPS", "GPS2", "GPS3") if one.has("Lat", "Lng")]
+    if not receivers:
         return log, receivers
-    kept = in_order(anchor[1])
-    log = log._replace(rows=anchor[0].rows[kept], stamps=anchor[1][kept])
-    if receiver is not None:
-        own, utc, fixed = log.of(receiver), gps_utc(receiver), _true_fix(receiver)
-        pairs = in_order(own, fixed) & in_order(utc, fixed)
-        if pairs.any():
-            log = log._replace(fit=fit_steady(own[pairs], utc[pairs], resolution_s=LOOP_S))
-    return log, receivers
+    receiver = next((one for one in receivers if _true_fix(one).any()), receivers[0])
+    own, utc, fixed = log.of(receiver), gps_utc(receiver), _true_fix(receiver)
+    pairs = in_order(own, fixed) & in_order(utc, fixed)
+    fit = fit_steady(own[pairs], utc[pairs], resolution_s=LOOP_S) if pairs.any() else None
+    return log._replace(receiver=receiver, fit=fit), receivers
 
 
 def longest_run(
@@ -579,7 +578,7 @@ def _gnss(log: ArdupilotLog, receiver: MessageTable) -> Stream:
 def _accuracies(receiver: MessageTable, log: ArdupilotLog, stamps: Array, down: Array) -> dict[str, Array]:
     """Columns from the messages GPA of the same receiver, which have the stamps of its GPS messages."""
     instance = receiver.get("I")[:1]
-    for table in log.sensors(*(("GPA",) if receiver.name == "GPS" else ("GPA" + receiver.name[3:], "GPA2"))):
+    for table in log.sensors("GPA" + receiver.name[3:]):
         if np.isfinite(instance).any() and table.get("I")[0] != instance[0]:
             continue
         us = table.get("TimeUS") if table.has("TimeUS") else 1e3 * table.get("TimeMS")

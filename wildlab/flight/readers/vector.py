@@ -596,7 +596,7 @@ def _marks(path: Path, data: bytes, height: str) -> RawLog:
 #: Headings by what they mean, as `plain` has them: data/headings.toml.
 HEADINGS: dict[str, list[str]] = tomllib.loads((DATA / "headings.toml").read_text("utf-8"))
 #: Words in a height's name, and what it then counts from.
-ELLIPSOID, SEA, HIGH, METRES = (frozenset(HEADINGS[one]) for one in ("ellipsoid", "sea", "height", "metres"))
+ELLIPSOID, SEA, HIGH = (frozenset(HEADINGS[one]) for one in ("ellipsoid", "sea", "height"))
 #: What a table of marks has none of: it is over time.
 TIMES = frozenset(
     {"time", "date", "datetime", "timestamp", "stamp", "utc", "gpst", "tow", "epoch", "millisecond"}
@@ -609,18 +609,11 @@ def _find(names: list[str], meaning: str, endings: Sequence[str] = _DEG) -> int 
     return next((names.index(one) for one in every if one in names), None)
 
 
-def _metres(names: list[str]) -> int:
-    """How many coordinates are in metres; nothing says which projection they are of."""
-    return len(METRES & {one.removesuffix("_m") for one in names})
-
-
 def table_sniff(head: bytes) -> bool:
-    """Whether a file is a table without times that has latitudes and longitudes, or names points and has
-    metres of a projection, which `table_decode` refuses with what to do."""
+    """Whether a file is a table without times that has latitudes and longitudes."""
     names = header_of(head)
     places = _find(names, "latitude") is not None and _find(names, "longitude") is not None
-    projected = _metres(names) == 2 and bool(set(HEADINGS["name"]) & set(names))
-    return (places or projected) and not any(TIMES & set(one.split("_")) for one in names)
+    return places and not any(TIMES & set(one.split("_")) for one in names)
 
 
 def table_decode(path: Path, data: bytes, zone: str | None) -> RawLog:
@@ -638,9 +631,6 @@ def table_decode(path: Path, data: bytes, zone: str | None) -> RawLog:
     if north is None or east is None:
         fix = "name two columns latitude and longitude (deg)"
         what = f"has no latitude and longitude: {there}"
-        if _metres(names):
-            what = f"has eastings and northings and no degrees: {there}"
-            fix = f"convert them, and {fix}"
         raise WildlabError(what, fix, file=path)
     words = {at: set(name.split("_")) for at, name in enumerate(names) if at not in (north, east)}
     ways = (("height_ellipsoid_m", ELLIPSOID, HIGH), ("height_sea_m", SEA, HIGH | SEA))
