@@ -27,7 +27,7 @@ def blocks_of(title):
 def test_the_format_of_the_walk_is_recognised_and_read(tmp_path, monkeypatch):
     (tmp_path / "spaced.py").write_text(blocks_of("A log format")[0], encoding="utf-8")
     monkeypatch.setattr(readers, "__path__", [*readers.__path__, str(tmp_path)])
-    monkeypatch.setitem(readers.FORMATS, "spaced", readers.Format("spaced", "spaced numbers", track=True))
+    monkeypatch.setitem(readers.FORMATS, "spaced", readers.Format("spaced", "spaced numbers"))
     rows = [f"{1.6e9 + k} {63.0 + 1e-5 * k} 10.0 {30.0 + k}" for k in range(20)]
     data = "\n".join([*rows, "torn"]).encode()
     assert readers.recognise(data) == "spaced"

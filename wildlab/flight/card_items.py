@@ -308,15 +308,11 @@ def choose_roles(found: Sequence[CardItem], stated: Mapping[str, str]) -> list[C
 def _copies(found: Sequence[CardItem]) -> Iterator[tuple[CardItem, CardItem]]:
     """Files whose every row is in another one of the same format, a copy or a part of it; and that other."""
     logs = [one for one in found if one.log is not None and one.log.parts.keys() & COPIED]
-    logs.sort(key=_rows, reverse=True)
+    logs.sort(key=lambda one: sum(map(len, one.log.parts.values())) if one.log else 0, reverse=True)
     for number, one in enumerate(logs):
         whole = next((other for other in logs[:number] if _within(one, other)), None)
         if whole is not None:
             yield one, whole
-
-
-def _rows(one: CardItem) -> int:
-    return sum(len(part) for part in one.log.parts.values()) if one.log else 0
 
 
 def _within(one: CardItem, other: CardItem) -> bool:
@@ -411,7 +407,9 @@ def _own(open_: Sequence[CardItem], images: CardItem | None) -> tuple[CardItem |
         "is of a vehicle that flies": _flies,
         "goes up and down by more than 15 m": lambda one: _climb(one) > ON_BOARD_M,
     }
-    best = max(open_, key=lambda one: (*(holds(one) for holds in signs.values()), _duration(one)))
+    best = max(
+        open_, key=lambda one: (*(holds(one) for holds in signs.values()), np.ptp(span_of(one) or (0.0, 0.0)))
+    )
     said = [sign for sign, holds in signs.items() if holds(best)]
     return best, f"of {len(open_)} logs it {listed(said) or 'is the longest'} (--role says otherwise)"
 
@@ -532,11 +530,6 @@ def way_of(one: CardItem, *stamped: tuple[str, str]) -> LoggedPath | None:
     return None
 
 
-def _level(place: Array, origin: tuple[float, float, float]) -> Array:
-    """(N, 3) metres from the origin, of latitudes and longitudes."""
-    return geodetic_to_ned(place[:, 0], place[:, 1], np.zeros(len(place)), origin)
-
-
 def _distance(mine: LoggedPath, theirs: LoggedPath) -> tuple[float, float]:
     """Median level distance at their times, and median height of mine above them, m; NaN: not comparable."""
     order = np.argsort(mine.times)
@@ -544,7 +537,9 @@ def _distance(mine: LoggedPath, theirs: LoggedPath) -> tuple[float, float]:
     if not both.any():
         return math.inf, math.nan
     origin = (float(mine.place[0, 0]), float(mine.place[0, 1]), 0.0)
-    a, b = (_level(one.place, origin) for one in (mine, theirs))
+    a, b = (
+        geodetic_to_ned(one.place[:, 0], one.place[:, 1], 0.0 * one.times, origin) for one in (mine, theirs)
+    )
     at = np.column_stack(
         [np.interp(theirs.times[both], mine.times[order], a[order, axis]) for axis in (0, 1)]
     )
@@ -569,11 +564,6 @@ def span_of(
             if len(times):
                 return float(times.min()), float(times.max())
     return None
-
-
-def _duration(one: CardItem) -> float:
-    span = span_of(one)
-    return span[1] - span[0] if span else 0.0
 
 
 def _overlap(a: Span | None, b: Span | None) -> float:

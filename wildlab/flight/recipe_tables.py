@@ -225,7 +225,11 @@ def read_poses(recipe: Recipe, block: Poses, table: RawTable, part: str, ids: Te
         )
         velocity = None if velocity is None else velocity[first]
         spreads = None if spreads is None else spreads[first]
-    rotation = _rotation(attitude, block.attitude)
+    rotation = (
+        euler_to_matrix(*attitude.T) if block.attitude.quaternion is None else quaternion_to_matrix(attitude)
+    )
+    if block.attitude.axes == "flu-enu":
+        rotation = R_NED_ENU @ rotation @ FLIP
     columns: dict[str, Any] = named(QUATERNION, matrix_to_quaternion(rotation).T)
     if velocity is not None:
         columns |= named(VELOCITY, velocity.T)
@@ -257,12 +261,6 @@ def _read_attitude(table: RawTable, attitude: Attitude, part: str) -> Array:
         f"{part}.quaternion",
     )
     return q * np.array([1, -1, -1, -1]) if attitude.inverse else q
-
-
-def _rotation(values: Array, attitude: Attitude) -> Array:
-    """``R_nb`` (N, 3, 3)."""
-    R = quaternion_to_matrix(values) if attitude.quaternion is not None else euler_to_matrix(*values.T)
-    return R_NED_ENU @ R @ FLIP if attitude.axes == "flu-enu" else R
 
 
 def _read_spreads(table: RawTable, spreads: Spreads, part: str) -> Array:

@@ -227,10 +227,11 @@ def lay_terrain(flight: Flight, path: Path, says: TerrainSays) -> Flight:
     if margin is None:
         margin = float(np.clip(HEIGHTS_ABOVE * max(above, default=0.0), LEAST, MOST))
     cut = _cut_out(places, positions, margin, says)
+    code = elevation.whole.to_authority(min_confidence=70)
     record = TerrainPart(
         source=path.name,
         sha256=elevation.digest,
-        crs=_named(elevation),
+        crs=":".join(code) if code is not None else elevation.whole.name[:100],
         heights=heights,
         added_m=added,
         unit=elevation.unit,
@@ -495,34 +496,20 @@ def _refuse_elsewhere(
     also: str = "the flight's origin",
 ) -> None:
     """Refuse a map that no position of the flight lies over, and say how far off it is."""
-    rows, columns = places.map.shape
-
-    def over(found: Array) -> bool:
-        inside = (found[:, 0] >= 0) & (found[:, 0] <= columns) & (found[:, 1] >= 0) & (found[:, 1] <= rows)
-        return bool(inside.any())
-
-    found = places.of_points(positions)
-    if over(found):
+    corner = np.array(places.map.shape[::-1], float)
+    found = places.of_points(positions)[:, :2]
+    if ((found >= 0) & (found <= corner)).all(axis=1).any():
         return
     middle = len(found) // 2
-    column, row = (columns / 2, rows / 2) if np.isnan(found[middle, :2]).any() else found[middle, :2]
-    nearest = np.clip([[column, row]], [0, 0], [columns, rows])
-    away = places.of_cells(nearest, np.zeros(1))[0, :2] - positions[middle, :2]
-    distance = float(np.hypot(*away))
-    far = f"{distance / 1000:,.1f} km away" if distance >= 1000 else f"{distance:.0f} m away"
-    far = far if math.isfinite(distance) else "beyond the reach of its own CRS"
+    nearest = np.clip(np.nan_to_num(found[middle], nan=0.0), 0.0, corner)
+    away = places.of_cells(nearest[None], np.zeros(1))[0, :2] - positions[middle, :2]
+    far = f"{np.hypot(*away) / 1000:,.1f} km away"
     raise WildlabError(
         f"{what} over this map, whose nearest cell is {far}",
         f"give another map, or check CRS and {also}",
         file=places.map.path,
         field="terrain",
     )
-
-
-def _named(elevation: ElevationMap) -> str:
-    """A short name of a CRS: its code, or what it calls itself."""
-    code = elevation.whole.to_authority(min_confidence=70)
-    return ":".join(code) if code is not None else elevation.whole.name[:100]
 
 
 # -- what heights count from, and how those of several logs are brought to one reference, never by a guess
@@ -629,15 +616,15 @@ def choose_reference(
         Where there is no one reference for all; it names streams, and what to state.
     """
     there = {name: _columns(stream) for name, stream in streams.items()}
-    placed = [name for name, stream in streams.items() if "latitude_deg" in stream.columns]
     names = [name for name in streams if there[name]]
-    without = tuple(name for name in placed if not there[name])
-    ways: dict[str, dict[str, HeightUse]] = {name: {} for name in names}
-    for name in names:
-        for kind in ("ellipsoid", "sea"):
-            column = f"height_{kind}_m"
-            if column in there[name]:
-                ways[name][kind] = HeightUse(column, 0.0, f"counts from {_COUNTED[column]}")
+    ways = {
+        name: {
+            kind: HeightUse(column, 0.0, f"counts from {_COUNTED[column]}")
+            for kind in ("ellipsoid", "sea")
+            if (column := f"height_{kind}_m") in there[name]
+        }
+        for name in names
+    }
     for name in names:
         if not ways[name]:
             tied = _tie(name, streams, there, [one for one in own if one in names], home_sea_m)
@@ -665,7 +652,9 @@ def choose_reference(
                 way[lacks] = way[has]._replace(add_m=way[has].add_m + sign * found[0], reason=reason)
     for reference in ("ellipsoid", "sea"):
         if all(reference in ways[name] for name in names):
-            return HeightPlan(reference, {name: ways[name][reference] for name in names}, without)
+            return HeightPlan(
+                reference, {name: ways[name][reference] for name in names}, tuple(streams.keys() - names)
+            )
     low = [name for name in names if "ellipsoid" not in ways[name]]
     high = [name for name in names if "sea" not in ways[name]]
     raise WildlabError(

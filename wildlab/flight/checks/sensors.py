@@ -644,7 +644,12 @@ def best_turn(given: Scans, rivals: Sequence[Scans]) -> float | None:
     done = turned(by)
     if not far_better(before, misfit(done), fitted=True):
         return None
-    return None if any(_clearly_more(other, done) for other in rivals) else by
+    for other in rivals:
+        more = np.concatenate([shares(a) - shares(b) for a, b in zip(other, done, strict=True)])
+        # By more than looks differ by chance.
+        if more.mean() > CLEARLY * more.std() / np.sqrt(len(more)):
+            return None
+    return by
 
 
 def _off(s: SourceLooks) -> Array:
@@ -654,12 +659,6 @@ def _off(s: SourceLooks) -> Array:
     off = wrap(np.arctan2(away[..., 1], away[..., 0]) - s.seen_at[good])
     off = np.where(np.isfinite(off), off, np.inf)
     return np.asarray(np.take_along_axis(off, np.abs(off).argmin(axis=0)[None], axis=0)[0])
-
-
-def _clearly_more(one: Scans, other: Scans) -> bool:
-    """Whether more of what is seen is at a target in `one`, by more than looks differ by chance."""
-    more = np.concatenate([shares(a) - shares(b) for a, b in zip(one, other, strict=True)])
-    return bool(more.mean() > CLEARLY * more.std() / np.sqrt(len(more)))
 
 
 def _turned_finding(given: Scans, turn_deg: float) -> Finding:

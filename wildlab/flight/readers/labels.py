@@ -460,10 +460,8 @@ WAYS = {
     ("u_px", "v_px"): "point",
     ("u", "v"): "point",
     ("x", "y", "w", "h"): "size",
-    ("left", "top", "width", "height"): "size",
     ("left_px", "top_px", "width_px", "height_px"): "size",
     ("x_min", "y_min", "x_max", "y_max"): "corners",
-    ("x0", "y0", "x1", "y1"): "corners",
     ("x", "y"): "point",
 }
 CLASS_COLUMNS = ("class", "label", "category")

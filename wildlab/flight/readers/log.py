@@ -320,7 +320,9 @@ def judge(part: str, decoded: Stream) -> dict[str, Mask]:
         Reason -> (N,) bool for `make_stream`.
     """
     have = {name: np.asarray(values, float) for name, values in decoded.columns.items() if name not in TEXTS}
-    time = _stamps(have)
+    stamps = [have[name] for name in TIMES if name in have]
+    # In UTC, or by the log's own clock where no row has UTC.
+    time = next((one for one in stamps if np.isfinite(one).any()), stamps[-1])
     utc = have.get("time_s", np.full(len(time), np.nan))
     found = dict(decoded.unusable)
 
@@ -367,12 +369,6 @@ def judge(part: str, decoded: Stream) -> dict[str, Mask]:
                 bad = bad | without
     _judge_order(time, have if where else {}, bad, found)
     return found
-
-
-def _stamps(columns: Mapping[str, ArrayLike]) -> Array:
-    """Times in UTC, or by the log's own clock where no row has UTC."""
-    stamps = [np.asarray(columns[name], float) for name in TIMES if name in columns]
-    return next((one for one in stamps if np.isfinite(one).any()), stamps[-1])
 
 
 def _judge_order(time: Array, have: Mapping[str, Array], bad: Mask, found: dict[str, Mask]) -> None:

@@ -135,18 +135,13 @@ def find_overlay(images: Sequence[NDArray[Any]]) -> Mask | None:
     if span <= 0 or float(np.nanmedian(change)) < MOVED * span:
         return None
     middle = np.median(stack, axis=0)
-    apart = np.abs(middle - cv2.medianBlur(_as_bytes(middle), 31).astype(np.float32) * span / 255 - low.min())
+    apart = np.abs(middle - cv2.medianBlur(middle.astype(np.uint8), 31))
     still = (change <= STILL * span) & (apart > 0.2 * span)
     # Strokes lie beside strokes: single pixels that noise happens to leave alone are none.
     still &= cv2.blur(still.astype(np.float32), (7, 7)) >= DENSE - 1e-6
     # Letters are thin and lie close together: what is between them belongs to them.
     marks = cv2.morphologyEx(still.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((7, 7), np.uint8)) > 0
     return _wider(marks) if 0 < marks.mean() < MOST_TEXT else np.zeros(marks.shape, bool)
-
-
-def _as_bytes(image: NDArray[np.float32]) -> NDArray[np.uint8]:
-    low, high = float(image.min()), float(image.max())
-    return np.asarray((image - low) * (255 / max(high - low, 1e-9)), np.uint8)
 
 
 def _wider(mask: Mask) -> Mask:
