@@ -126,7 +126,7 @@ class Proposal:
         self.logs: dict[str, dict[str, Any]] = {}
         self.data: dict[str, Any] = {"name": wishes.name}
         self.own, camera, receiver, self.triggers = map(self._only, ("own", "camera", "receiver", "triggers"))
-        images = _with_most_rows(one for one in self.by_role["images"] if one.item.part("photos") is not None)
+        images = self._only("images")
         lens: str | None = None
         if images is not None:
             found, lens, said = one_camera(images.item, images.target, wishes.camera)
@@ -186,10 +186,11 @@ class Proposal:
         """The one thing of a role that only one can have; of several the one with the most rows."""
         several = self.by_role[role]
         taken = _with_most_rows(several)
-        for one in several:
-            if taken is not None and one is not taken:
-                left = f"{one.item.shown} is left out: {taken.item.shown} has more rows"
-                self.notes.append(f"{left} ({role}).")
+        self.notes += [
+            f"{one.item.shown} is left out: {taken.item.shown} has more rows ({role})."
+            for one in several
+            if taken is not None and one is not taken
+        ]
         return taken
 
     def _choose_heights(self, own: set[str]) -> HeightPlan:
@@ -309,11 +310,6 @@ class Proposal:
     def _add_frames(self, images: Choice, lens: str | None, placed: bool) -> None:
         """The images, with the poses that stand in them."""
         photos, data, wishes, own = stream_of(images, "photos"), self.data, self.wishes, self.own
-        self.notes += [
-            f"The images of {one.item.shown} are left out: {images.item.shown} has more."
-            for one in self.by_role["images"]
-            if one.item.name != images.item.name
-        ]
         camera, how = camera_of(images.item.log or RawLog({}), wishes.camera, wishes.focal_px)
         if camera is None:
             self.notes.append(f"The images are left out: {how}. Give --camera or --focal.")

@@ -639,7 +639,6 @@ def log_part(log: RawLog, wanted: LogTable, path: Path) -> Stream:
         log = of_camera(log, wanted.camera)
     stream = log.parts[wanted.part]
     columns = dict(stream.columns)
-    use, why = columns["use"].copy(), columns["why"].copy()
     if "time_s" in columns or "time_log_s" in columns:
         known = columns.get("time_s", np.full(len(stream), np.nan))
         # The log's own stamps, where the recipe says what they count from; those of images may stand alone.
@@ -647,6 +646,10 @@ def log_part(log: RawLog, wanted: LogTable, path: Path) -> Stream:
         if stated and not np.isfinite(known).any() and "time_log_s" in columns:
             known = columns["time_log_s"]
         columns["time_s"] = known + wanted.offset_s
+    for name in ("file", "image"):
+        if name in columns:
+            columns["stem"] = np.array([Path(str(one)).stem for one in columns[name]], dtype=object)
+    done = replace(stream, columns=columns)
     if wanted.height is not None:
         name = f"height_{wanted.height}_m"
         if name not in columns:
@@ -654,12 +657,7 @@ def log_part(log: RawLog, wanted: LogTable, path: Path) -> Stream:
             problem = f"its {wanted.part} have no heights of the kind {wanted.height!r}"
             raise WildlabError(problem, f"there are {there}", file=path, field="height")
         columns["height_m"] = columns[name] + wanted.add_m
-        lost = (use == 1.0) & ~np.isfinite(columns["height_m"])
-        use[lost], why[lost] = 0.0, "no height"
-    for name in ("file", "image"):
-        if name in columns:
-            columns["stem"] = np.array([Path(str(one)).stem for one in columns[name]], dtype=object)
-    done = Stream({**columns, "use": use, "why": why}, stream.rows, stream.counted_in)
+        done = done.without(~np.isfinite(columns["height_m"]), "no height")
     return _by_time(done) if wanted.part == "photos" else done
 
 
@@ -678,17 +676,8 @@ def of_images(pixels: Stream, images: Stream) -> Stream:
     if times is not None and np.isfinite(times).any():
         there = np.isfinite(times)
     known = {str(one) for name in ("file", "stem") for one in images.columns[name][there]}
-    strange = np.array(
-        [
-            str(a) not in known and str(b) not in known
-            for a, b in zip(pixels.columns["image"], pixels.columns["stem"], strict=True)
-        ],
-        bool,
-    )
-    use, why = pixels.columns["use"].copy(), pixels.columns["why"].copy()
-    why[strange & (use == 1.0)] = "its image is not there"
-    use[strange] = 0.0
-    return Stream({**pixels.columns, "use": use, "why": why}, pixels.rows, pixels.counted_in)
+    of_known = [pd.Series(pixels.columns[name]).isin(known) for name in ("image", "stem")]
+    return pixels.without(~np.any(of_known, axis=0), "its image is not there")
 
 
 def match_images(images: Stream, of_record: Array) -> TriggerMatch | None:

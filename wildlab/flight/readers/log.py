@@ -132,6 +132,14 @@ class Stream:
         """(N,) rows that can be used."""
         return np.asarray(self.columns["use"] == 1.0)
 
+    def without(self, rows: Mask, reason: str) -> Stream:
+        """The same, some of the rows (N,) not used for a reason, of what was judged."""
+        lost = rows & self.used
+        use, why = (
+            np.where(lost, *pair) for pair in ((0.0, self.columns["use"]), (reason, self.columns["why"]))
+        )
+        return replace(self, columns={**self.columns, "use": use, "why": why})
+
     def take(self, rows: NDArray[Any]) -> Stream:
         """The rows that a mask or an index picks, of what was judged."""
         columns = {name: one[rows] for name, one in self.columns.items()}
