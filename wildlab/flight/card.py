@@ -7,7 +7,6 @@ written into the recipe with a note.
 
 from __future__ import annotations
 
-import math
 import re
 import tempfile
 from collections import Counter
@@ -185,7 +184,11 @@ class Proposal:
     def _only(self, role: str) -> Choice | None:
         """The one thing of a role that only one can have; of several the one with the most rows."""
         several = self.by_role[role]
-        taken = _with_most_rows(several)
+
+        def rows(one: Choice) -> int:
+            return sum(int(part.used.sum()) for part in one.item.log.parts.values()) if one.item.log else 0
+
+        taken = max(several, key=rows, default=None)
         self.notes += [
             f"{one.item.shown} is left out: {taken.item.shown} has more rows ({role})."
             for one in several
@@ -448,7 +451,7 @@ class Proposal:
                 f"The ground is taken to be level, as {len(heights)} surveyed points within "
                 f"{spread:.1f} m have it: better a map, --terrain."
             )
-            return _to_millimetres(mean)
+            return round(mean, 3)
         for key, stream in self.streams.items():
             home = stream.columns.get("height_home_m")
             of_home = [] if home is None else self._heights_of(key, home)
@@ -457,7 +460,7 @@ class Proposal:
                 self.notes.append(
                     "The ground is taken to be level, as the take-off: better a map, --terrain."
                 )
-                return _to_millimetres(float(np.median(of_home)))
+                return round(float(np.median(of_home)), 3)
         return None
 
     def _heights_of(self, key: str, above: Any = 0.0) -> list[float]:
@@ -518,15 +521,6 @@ def _no_utc(choice: Choice) -> WildlabError:
     )
 
 
-def _with_most_rows(several: Iterable[Choice]) -> Choice | None:
-    """That of which most rows can be used."""
-
-    def rows(one: Choice) -> int:
-        return sum(int(part.used.sum()) for part in one.item.log.parts.values()) if one.item.log else 0
-
-    return max(several, key=rows, default=None)
-
-
 def _above_take_off_alone(stream: Stream) -> bool:
     """Whether a part has heights above the take-off, and none of another kind in any row that can be used."""
     others = [stream.columns.get(f"height_{kind}_m") for kind in ("ellipsoid", "sea")]
@@ -538,10 +532,6 @@ def _above_take_off_alone(stream: Stream) -> bool:
 def _comment(text: str) -> str:
     """One line of a comment, whatever is in the text."""
     return "# " + re.sub(r"[\x00-\x1f\x7f\u0085\u2028\u2029]+", " ", text)
-
-
-def _to_millimetres(metres: float) -> float:
-    return math.floor(metres * 1000 + 0.5) / 1000
 
 
 def _stems(photos: Stream) -> list[str]:

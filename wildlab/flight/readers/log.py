@@ -135,10 +135,9 @@ class Stream:
     def without(self, rows: Mask, reason: str) -> Stream:
         """The same, some of the rows (N,) not used for a reason, of what was judged."""
         lost = rows & self.used
-        use, why = (
-            np.where(lost, *pair) for pair in ((0.0, self.columns["use"]), (reason, self.columns["why"]))
-        )
-        return replace(self, columns={**self.columns, "use": use, "why": why})
+        marks = {"use": np.where(lost, 0.0, self.columns["use"]), "why": self.columns["why"].copy()}
+        marks["why"][lost] = reason
+        return replace(self, columns=self.columns | marks)
 
     def take(self, rows: NDArray[Any]) -> Stream:
         """The rows that a mask or an index picks, of what was judged."""
