@@ -7,7 +7,6 @@ written into the recipe with a note.
 
 from __future__ import annotations
 
-import math
 import re
 import tempfile
 from collections import Counter
@@ -127,7 +126,7 @@ class Proposal:
         self.logs: dict[str, dict[str, Any]] = {}
         self.data: dict[str, Any] = {"name": wishes.name}
         self.own, camera, receiver, self.triggers = map(self._only, ("own", "camera", "receiver", "triggers"))
-        images = _with_most_rows(one for one in self.by_role["images"] if one.item.part("photos") is not None)
+        images = self._only("images")
         lens: str | None = None
         if images is not None:
             found, lens, said = one_camera(images.item, images.target, wishes.camera)
@@ -186,11 +185,16 @@ class Proposal:
     def _only(self, role: str) -> Choice | None:
         """The one thing of a role that only one can have; of several the one with the most rows."""
         several = self.by_role[role]
-        taken = _with_most_rows(several)
-        for one in several:
-            if taken is not None and one is not taken:
-                left = f"{one.item.shown} is left out: {taken.item.shown} has more rows"
-                self.notes.append(f"{left} ({role}).")
+
+        def rows(one: Choice) -> int:
+            return sum(int(part.used.sum()) for part in one.item.log.parts.values()) if one.item.log else 0
+
+        taken = max(several, key=rows, default=None)
+        self.notes += [
+            f"{one.item.shown} is left out: {taken.item.shown} has more rows ({role})."
+            for one in several
+            if taken is not None and one is not taken
+        ]
         return taken
 
     def _choose_heights(self, own: set[str]) -> HeightPlan:
@@ -310,11 +314,6 @@ class Proposal:
     def _add_frames(self, images: Choice, lens: str | None, placed: bool) -> None:
         """The images, with the poses that stand in them."""
         photos, data, wishes, own = stream_of(images, "photos"), self.data, self.wishes, self.own
-        self.notes += [
-            f"The images of {one.item.shown} are left out: {images.item.shown} has more."
-            for one in self.by_role["images"]
-            if one.item.name != images.item.name
-        ]
         camera, how = camera_of(images.item.log or RawLog({}), wishes.camera, wishes.focal_px)
         if camera is None:
             self.notes.append(f"The images are left out: {how}. Give --camera or --focal.")
@@ -452,7 +451,7 @@ class Proposal:
                 f"The ground is taken to be level, as {len(heights)} surveyed points within "
                 f"{spread:.1f} m have it: better a map, --terrain."
             )
-            return _to_millimetres(mean)
+            return round(mean, 3)
         for key, stream in self.streams.items():
             home = stream.columns.get("height_home_m")
             of_home = [] if home is None else self._heights_of(key, home)
@@ -461,7 +460,7 @@ class Proposal:
                 self.notes.append(
                     "The ground is taken to be level, as the take-off: better a map, --terrain."
                 )
-                return _to_millimetres(float(np.median(of_home)))
+                return round(float(np.median(of_home)), 3)
         return None
 
     def _heights_of(self, key: str, above: Any = 0.0) -> list[float]:
@@ -522,15 +521,6 @@ def _no_utc(choice: Choice) -> WildlabError:
     )
 
 
-def _with_most_rows(several: Iterable[Choice]) -> Choice | None:
-    """That of which most rows can be used."""
-
-    def rows(one: Choice) -> int:
-        return sum(int(part.used.sum()) for part in one.item.log.parts.values()) if one.item.log else 0
-
-    return max(several, key=rows, default=None)
-
-
 def _above_take_off_alone(stream: Stream) -> bool:
     """Whether a part has heights above the take-off, and none of another kind in any row that can be used."""
     others = [stream.columns.get(f"height_{kind}_m") for kind in ("ellipsoid", "sea")]
@@ -542,10 +532,6 @@ def _above_take_off_alone(stream: Stream) -> bool:
 def _comment(text: str) -> str:
     """One line of a comment, whatever is in the text."""
     return "# " + re.sub(r"[\x00-\x1f\x7f\u0085\u2028\u2029]+", " ", text)
-
-
-def _to_millimetres(metres: float) -> float:
-    return math.floor(metres * 1000 + 0.5) / 1000
 
 
 def _stems(photos: Stream) -> list[str]:

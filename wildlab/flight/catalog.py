@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-import tempfile
 from collections.abc import Callable
 from http.client import HTTPException
 from pathlib import Path
@@ -18,7 +17,7 @@ from urllib.request import urlopen
 from pydantic import Field, RootModel
 
 from wildlab.errors import WildlabError, system_error
-from wildlab.files import sha256
+from wildlab.files import sha256, write_atomic
 from wildlab.flight.files import (
     Below,
     SafeName,
@@ -153,23 +152,19 @@ def fetch(name: str, progress: Progress | None = None) -> list[Path]:
     dataset = find_dataset(name)
     folder = dataset_folder(name)
     missing = [file for file in dataset.files if not _is_right(folder / file.path, file)]
-    if missing:
-        for file in missing:
-            _place(folder, file)
-        mirror = os.environ.get(MIRROR_VARIABLE)
-        existing = next(parent for parent in (folder, *folder.parents) if parent.is_dir())
-        try:
-            with tempfile.TemporaryDirectory(dir=existing, prefix=".fetch.") as temporary:
-                for number, file in enumerate(missing):
-                    if progress is not None:
-                        progress(file.path, number, len(missing))
-                    (Path(temporary) / str(number)).write_bytes(_read(file, mirror))
-                for number, file in enumerate(missing):
-                    place = _place(folder, file)
-                    place.parent.mkdir(parents=True, exist_ok=True)
-                    (Path(temporary) / str(number)).replace(place)
-        except OSError as error:
-            raise system_error(error, folder) from None
+    places = [_place(folder, file) for file in missing]
+    mirror = os.environ.get(MIRROR_VARIABLE)
+    contents = []
+    for number, file in enumerate(missing):
+        if progress is not None:
+            progress(file.path, number, len(missing))
+        contents.append(_read(file, mirror))
+    try:
+        for place, content in zip(places, contents, strict=True):
+            place.parent.mkdir(parents=True, exist_ok=True)
+            write_atomic(place, content)
+    except OSError as error:
+        raise system_error(error, folder) from None
     return [folder / file.path for file in dataset.files]
 
 

@@ -640,7 +640,6 @@ def log_part(log: RawLog, wanted: LogTable, path: Path) -> Stream:
         log = of_camera(log, wanted.camera)
     stream = log.parts[wanted.part]
     columns = dict(stream.columns)
-    use, why = columns["use"].copy(), columns["why"].copy()
     if "time_s" in columns or "time_log_s" in columns:
         known = columns.get("time_s", np.full(len(stream), np.nan))
         # The log's own stamps, where the recipe says what they count from; those of images may stand alone.
@@ -648,6 +647,10 @@ def log_part(log: RawLog, wanted: LogTable, path: Path) -> Stream:
         if stated and not np.isfinite(known).any() and "time_log_s" in columns:
             known = columns["time_log_s"]
         columns["time_s"] = known + wanted.offset_s
+    for name in ("file", "image"):
+        if name in columns:
+            columns["stem"] = np.array([Path(str(one)).stem for one in columns[name]], dtype=object)
+    done = replace(stream, columns=columns)
     if wanted.height is not None:
         name = f"height_{wanted.height}_m"
         if name not in columns:
@@ -655,12 +658,7 @@ def log_part(log: RawLog, wanted: LogTable, path: Path) -> Stream:
             problem = f"its {wanted.part} have no heights of the kind {wanted.height!r}"
             raise WildlabError(problem, f"there are {there}", file=path, field="height")
         columns["height_m"] = columns[name] + wanted.add_m
-        lost = (use == 1.0) & ~np.isfinite(columns["height_m"])
-        use[lost], why[lost] = 0.0, "no height"
-    for name in ("file", "image"):
-        if name in columns:
-            columns["stem"] = np.array([Path(str(one)).stem for one in columns[name]], dtype=object)
-    done = Stream({**columns, "use": use, "why": why}, stream.rows, stream.counted_in)
+        done = done.without(~np.isfinite(columns["height_m"]), "no height")
     return _by_time(done) if wanted.part == "photos" else done
 
 
@@ -682,14 +680,11 @@ def of_images(pixels: Stream, images: Stream) -> Stream:
     match = match_names(rows)
     found = {one: rows.get(match(str(one)) or "", -1) for one in dict.fromkeys(pixels.columns["image"])}
     row = np.array([found[one] for one in pixels.columns["image"]], int)
-    strange = (row < 0) | ~there[row]
-    use, why = pixels.columns["use"].copy(), pixels.columns["why"].copy()
-    why[strange & (use == 1.0)] = "its image is not there"
-    use[strange] = 0.0
-    columns = {**pixels.columns, "use": use, "why": why}
+    columns = dict(pixels.columns)
     for name, of in (("image", "file"), ("stem", "stem")):
         columns[name] = np.where(row < 0, pixels.columns[name], np.asarray(images.columns[of], object)[row])
-    return Stream(columns, pixels.rows, pixels.counted_in)
+    known = Stream(columns, pixels.rows, pixels.counted_in)
+    return known.without((row < 0) | ~there[row], "its image is not there")
 
 
 def match_images(images: Stream, of_record: Array) -> TriggerMatch | None:

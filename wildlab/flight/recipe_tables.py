@@ -195,48 +195,42 @@ def read_poses(recipe: Recipe, block: Poses, table: RawTable, part: str, ids: Te
         rows of one frame differ.
     """
     position = None if block.position is None else read_position(table, block.position, f"{part}.position")
-    velocity = spreads = stamps = None
+    values = {"attitude": _read_attitude(table, block.attitude, f"{part}.attitude")}
+    stamps = None
     if block.velocity is not None:
-        velocity = read_velocity(table, block.velocity, f"{part}.velocity")
+        values["velocity"] = read_velocity(table, block.velocity, f"{part}.velocity")
     if block.spreads is not None:
-        spreads = _read_spreads(table, block.spreads, f"{part}.spreads")
+        values["spreads"] = _read_spreads(table, block.spreads, f"{part}.spreads")
     if block.time is not None:
         stamps = times(table, block.time, f"{part}.time", recipe.time.zone, recipe.time.epoch)
-    attitude = _read_attitude(table, block.attitude, f"{part}.attitude")
     note = ""
     if position is None:
         note = f"The positions of nav/{part.removeprefix('poses.')} are linear between those of the receiver."
     elif ids is not None:
         frame, first = _rows_of_frames(ids)
-        for values in (position.values, attitude, velocity, spreads):
-            if values is not None:
-                differs = np.abs(values - values[first][frame]).max(axis=1) > SAME
-                _refuse_differing(table, differs, frame, first, ids, "pose", part)
+        values["position"] = position.values
+        for one in values.values():
+            differs = np.abs(one - one[first][frame]).max(axis=1) > SAME
+            _refuse_differing(table, differs, frame, first, ids, "pose", part)
         if block.attitude.yaw_from_bearing is not None:
-            bearing = block.attitude.yaw_from_bearing
-            yaw, note = _yaw_from_bearing(
-                table, bearing, f"{part}.attitude.yaw_from_bearing", position, frame, first
-            )
-            attitude = np.column_stack([attitude, yaw[frame]])
-        position, attitude, ids = (
-            position._replace(values=position.values[first]),
-            attitude[first],
-            ids[first],
-        )
-        velocity = None if velocity is None else velocity[first]
-        spreads = None if spreads is None else spreads[first]
+            bearing, of = block.attitude.yaw_from_bearing, f"{part}.attitude.yaw_from_bearing"
+            yaw, note = _yaw_from_bearing(table, bearing, of, position, frame, first)
+            values["attitude"] = np.column_stack([values["attitude"], yaw[frame]])
+        values, ids = {name: one[first] for name, one in values.items()}, ids[first]
+        position = position._replace(values=values["position"])
+    attitude = values["attitude"]
     rotation = (
         euler_to_matrix(*attitude.T) if block.attitude.quaternion is None else quaternion_to_matrix(attitude)
     )
     if block.attitude.axes == "flu-enu":
         rotation = R_NED_ENU @ rotation @ FLIP
     columns: dict[str, Any] = named(QUATERNION, matrix_to_quaternion(rotation).T)
-    if velocity is not None:
-        columns |= named(VELOCITY, velocity.T)
+    if "velocity" in values:
+        columns |= named(VELOCITY, values["velocity"].T)
     if ids is not None:
         columns["frame_id"] = ids
-    if spreads is not None:
-        horizontal, vertical, tilt, heading = spreads.T
+    if "spreads" in values:
+        horizontal, vertical, tilt, heading = values["spreads"].T
         P = pose_covariance(horizontal, vertical, tilt, heading, rotation)
         columns |= dict(covariance_columns(P))
     return Rows(columns, stamps, position, ids, note)
@@ -316,14 +310,11 @@ def _yaw_from_bearing(
     latitude = numbers(table, bearing.latitude, "angle", f"{part}.latitude")
     longitude = numbers(table, bearing.longitude, "angle", f"{part}.longitude")
     beside = numbers(table, bearing.minus, "angle", f"{part}.minus")
-    north, east = np.empty(len(frame)), np.empty(len(frame))
-    for number, row in enumerate(first):
-        rows = frame == number
-        a, b, c = position.values[row].tolist()
-        origin = (a, b, c)
-        there = geodetic_to_ned(latitude[rows], longitude[rows], np.full(rows.sum(), origin[2]), origin)
-        north[rows], east[rows] = there[:, 0], there[:, 1]
-    yaw = np.arctan2(east, north) - beside
+    from pyproj import Geod  # few recipes need it
+
+    lat, lon, _ = position.values[first][frame].T
+    azimuth, *_ = Geod(ellps="WGS84").inv(*np.degrees([lon, lat, longitude, latitude]))
+    yaw = np.radians(azimuth) - beside
     if bearing.past_nadir is not None:
         slant = numbers(table, bearing.past_nadir.slant, "angle", f"{part}.past_nadir.slant")
         minus = numbers(table, bearing.past_nadir.minus, "angle", f"{part}.past_nadir.minus")

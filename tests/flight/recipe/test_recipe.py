@@ -9,8 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 import rasterio
-from hypothesis import given
-from hypothesis import strategies as st
 from rasterio.transform import Affine
 from scipy.spatial.transform import Rotation
 
@@ -18,8 +16,6 @@ from tests.flight.recipe.comparing import near
 from wildlab.errors import WildlabError
 from wildlab.flight.checks.check import check_flight
 from wildlab.flight.clocks import covariances
-from wildlab.flight.recipe_tables import _rotation
-from wildlab.flight.recipes import Attitude
 from wildlab.flight.schema import UNITS, factor
 from wildlab.flight.store import Flight, accept_changes, load_flight
 from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
@@ -84,20 +80,20 @@ def test_local_positions_both_ways(raw):
     near(_position(again(raw, "poses.log.position", turned))[0], [2000, 30.48, -30])
 
 
-@given(st.lists(st.floats(-3, 3), min_size=3, max_size=3))
-def test_attitudes_in_other_axes(rotation_vector):
-    """The same body, described forward-left-up in east-north-up, and by the inverse quaternion."""
-    R = Rotation.from_rotvec(rotation_vector)
-    nose, right = R.apply([1, 0, 0]), R.apply([0, 1, 0])  # in n: north, east, down
+@pytest.mark.parametrize("turn", [[0.3, -0.2, 2.5], [-1.1, 2.0, 0.4], [0.0, 0.0, -3.0]])
+def test_attitudes_in_other_axes(raw, turn):
+    """The same body, described forward-left-up in east-north-up."""
+    R = Rotation.from_rotvec(turn)
+    nose, right, belly = R.as_matrix().T  # in n: north, east, down
 
     def ned_to_enu(v: np.ndarray) -> np.ndarray:
         return np.array([v[1], v[0], -v[2]])
 
-    columns = np.column_stack([ned_to_enu(nose), -ned_to_enu(right), -ned_to_enu(R.apply([0, 0, 1]))])
-    q = Rotation.from_matrix(columns).as_quat(scalar_first=True)[None]
-    names = ("a", "b", "c", "d")
-    ros = Attitude(quaternion=names, order="wxyz", axes="flu-enu")
-    np.testing.assert_allclose(_rotation(q, ros)[0], R.as_matrix(), atol=1e-12)
+    columns = np.column_stack([ned_to_enu(nose), -ned_to_enu(right), -ned_to_enu(belly)])
+    cells = ",".join(map(repr, Rotation.from_matrix(columns).as_quat(scalar_first=True).tolist()))
+    raw.tables["nav.csv"] = raw.tables["nav.csv"].replace(",1,0,0,0", f",{cells}")
+    raw.set("poses.log.attitude.axes", "flu-enu")
+    near(_rotations(raw.run()), [R.as_matrix()] * 5, atol=1e-12)
 
 
 def test_order_and_inverse_of_quaternions(raw):

@@ -132,6 +132,13 @@ class Stream:
         """(N,) rows that can be used."""
         return np.asarray(self.columns["use"] == 1.0)
 
+    def without(self, rows: Mask, reason: str) -> Stream:
+        """The same, some of the rows (N,) not used for a reason, of what was judged."""
+        lost = rows & self.used
+        marks = {"use": np.where(lost, 0.0, self.columns["use"]), "why": self.columns["why"].copy()}
+        marks["why"][lost] = reason
+        return replace(self, columns=self.columns | marks)
+
     def take(self, rows: NDArray[Any]) -> Stream:
         """The rows that a mask or an index picks, of what was judged."""
         columns = {name: one[rows] for name, one in self.columns.items()}
