@@ -21,6 +21,7 @@ from wildlab.replay import scene as scenes
 from wildlab.replay.page import drawn, page
 from wildlab.replay.scene import (
     Estimates,
+    Points,
     ReplayScene,
     Sightings,
     Target,
@@ -50,8 +51,8 @@ def scene_of_a_minute(name: str = HOSTILE) -> ReplayScene:
         path=scenes.Path(t, way, name),
         views=Views(names, t, outlines),
         sightings=Sightings(np.arange(61), np.column_stack([t, t]), names),
-        points=Estimates(t, target + 1, P, error, nees),
-        tracks=(Estimates(t, target - 1, P, error, nees, name, name, name),),
+        points=Points(t, target + 1, P, names, error, nees),
+        tracks=(Estimates(name, name, name, t, target - 1, P, error, nees),),
         truth=(Target(name, t, target), Target("post", np.array([np.nan]), target[:1])),
         terrain=Terrain(height, north=0.0, east=-100.0, step=20.0),
         lacks=(name,),

@@ -26,6 +26,7 @@ from wildlab.replay.images import spread_evenly
 from wildlab.replay.scene import (
     Array,
     Estimates,
+    Points,
     ReplayScene,
     heights,
     minutes,
@@ -158,7 +159,7 @@ def _way(times: Array, places: Array, rows: Indices) -> dict[str, Any]:
     return {"t": _rounded(t, 3), "p": _rounded(places[rows, :2]), "gap": longest_gap(t)}
 
 
-def _judged(of: Estimates, most: int) -> dict[str, Any]:
+def _judged(of: Points | Estimates, most: int) -> dict[str, Any]:
     rows = spread_evenly(len(of.times), most)
     return _way(of.times, of.places, rows) | {
         "ellipses": _rounded(_ellipses(of.covariance[rows])),

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from wildlab.geometry.covariances import ellipse_axes
 from wildlab.geometry.frames import ned_to_enu
-from wildlab.replay.scene import MOST_NODES, Array, Estimates, ReplayScene, heights, plain, relief
+from wildlab.replay.scene import MOST_NODES, Array, Estimates, Points, ReplayScene, heights, plain, relief
 from wildlab.reporting.figures import BLUE, ORANGE, colour
 
 #: Whose recordings and layouts belong together, and the time line.
@@ -156,7 +156,7 @@ class _Writer:
             self.fixed(entity, rr.SeriesLines(colors=_look(color, 1)["colors"]))
             self.columns(entity, times[known], rr.Scalars.columns(scalars=values[known]))
 
-    def judged(self, entity: str, of: Estimates, color: str) -> None:
+    def judged(self, entity: str, of: Points | Estimates, color: str) -> None:
         """Places with their ellipses, where these are known, errors and NEES."""
         times, counts = np.unique(of.times, return_counts=True)
         look = rr.Points3D.from_fields(**_look(color, 3))

@@ -98,27 +98,38 @@ class Sightings(NamedTuple):
     names: Names
 
 
-class Estimates(NamedTuple):
-    """Detections on the ground, or one target as one filter tracks it, in the order of time.
+class Points(NamedTuple):
+    """Detections on the ground.
 
     Attributes
     ----------
     times, places, covariance
         (K,) s, (K, 3) m, (K, 2, 2) m^2 north before east; a covariance may be NaN.
+    names
+        (K,) the target, "" none.
     error, nees
-        (K,) m and 1, beside truth; NaN where that is not known.
-    target, filter, sensor
-        Of a track.
+        (K,) m and 1, point beside truth; NaN where that is not known.
     """
 
     times: Array
     places: Array
     covariance: Array
+    names: Names
     error: Array
     nees: Array
-    target: str = ""
-    filter: str = ""
-    sensor: str = ""
+
+
+class Estimates(NamedTuple):
+    """One target as one filter follows it: as `Points`, one row for each look, in the order of time."""
+
+    target: str
+    filter: str
+    sensor: str
+    times: Array
+    places: Array
+    covariance: Array
+    error: Array
+    nees: Array
 
 
 class Target(NamedTuple):
@@ -159,7 +170,7 @@ class ReplayScene:
     camera: Camera | None = None
     views: Views | None = None
     sightings: Sightings | None = None
-    points: Estimates | None = None
+    points: Points | None = None
     tracks: tuple[Estimates, ...] = ()
     truth: tuple[Target, ...] = ()
     terrain: Terrain | None = None
@@ -391,7 +402,7 @@ def _sightings(flight: Flight, views: Views | None, lacks: list[str]) -> Sightin
     return Sightings(at[good].astype(np.intp), uv[good], names.to_numpy(object)[good])
 
 
-def _points(flight: Flight, source: str | None, lacks: list[str]) -> Estimates | None:
+def _points(flight: Flight, source: str | None, lacks: list[str]) -> Points | None:
     if source is None or flight.frames is None or flight.manifest.camera is None:
         return None
     if flight.detections is None or not (flight.detections["kind"] == "pixel").any():
@@ -421,9 +432,14 @@ def _points(flight: Flight, source: str | None, lacks: list[str]) -> Estimates |
             error[rows], of_error[rows] = errors_of(scored), error_covariances(scored)
         except WildlabError as refusal:
             lacks.append(f"errors of the detections: {refusal.problem}")
-    places = table[["north_m", "east_m", "down_m"]].to_numpy(float)
-    nees = position_nees(error, of_error)
-    return Estimates(table["time_s"].to_numpy(float), places, P, np.hypot(*error.T), nees)
+    return Points(
+        table["time_s"].to_numpy(float),
+        table[["north_m", "east_m", "down_m"]].to_numpy(float),
+        P,
+        table["target_id"].astype(str).to_numpy(object),
+        np.hypot(*error.T),
+        position_nees(error, of_error),
+    )
 
 
 def _tracks(flight: Flight, table: pd.DataFrame | None, lacks: list[str]) -> tuple[Estimates, ...]:
@@ -442,12 +458,14 @@ def _tracks(flight: Flight, table: pd.DataFrame | None, lacks: list[str]) -> tup
             down = np.full(len(xy), 0.0 if level is None else level[0])
         found.append(
             Estimates(
+                str(target),
+                str(name),
+                str(sensor),
                 rows["time_s"].to_numpy(float),
                 np.column_stack([xy, np.nan_to_num(down)]),
                 rows[["p_00", "p_01", "p_01", "p_11"]].to_numpy(float).reshape(-1, 2, 2),
                 np.hypot(*rows[["error_north_m", "error_east_m"]].to_numpy(float).T),
                 rows["nees"].to_numpy(float),
-                *map(str, (target, name, sensor)),
             )
         )
     return tuple(found)
