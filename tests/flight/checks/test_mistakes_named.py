@@ -425,6 +425,10 @@ CASES: dict[str, list[tuple[Any, ...]]] = {
             *("turns-too-fast", f"problem {NAV} q_w", "attitude in degrees"),
         ),
         (
+            both(rows(NAV, lambda nav: nav.iloc[::20].reset_index(drop=True)), euler(NAV, np.degrees)),
+            *("down-everywhere", f"problem {NAV} q_w", "attitude in degrees"),
+        ),
+        (
             euler(NAV, lambda e: np.radians(np.unwrap(e, axis=0, period=360))),
             *("heading-not-course", f"warning {NAV}", "yaw in radians, read as degrees"),
         ),

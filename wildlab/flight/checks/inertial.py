@@ -33,7 +33,7 @@ from wildlab.flight.checks.findings import (
 from wildlab.flight.clocks import gnss_times
 from wildlab.flight.schema import FORCE, POSITION, QUATERNION, RATE, SECOND_COLUMNS, VELOCITY
 from wildlab.flight.store import Flight
-from wildlab.geometry.frames import Array
+from wildlab.geometry.frames import Array, quaternion_to_matrix
 from wildlab.geometry.gravity import USUAL_GRAVITY
 
 AXES = "xyz"
@@ -389,6 +389,9 @@ FACTOR = 10.0
 FASTEST = 10.0  # rad/s
 #: Share of a flight that may be faster, as where it ends in a tumble.
 TUMBLING = 0.01
+#: Length of the mean direction of down in the body: 0.9 where one flies, 0.7 or more where a gimbal goes from
+#: the horizon to straight down, and below 0.4 where degrees were read as radians.
+TUMBLED = 0.5
 #: Turning counts from here on, flying as well.
 TURNING, SLOWEST = 0.05, 5.0  # rad/s, m/s
 ENOUGH_TURNS = 10
@@ -447,10 +450,21 @@ def _rate_unit(imu: Inertial, moved: Moves | None) -> Iterator[Finding]:
 
 
 def turning(flight: Flight) -> Iterator[Finding]:
-    """Attitudes that turn faster than anything flies, as of angles in degrees that were read as radians."""
+    """Attitudes that turn faster than anything flies, or point down in every direction of the body, as of
+    angles in degrees that were read as radians."""
+    causes = ("attitude in degrees",)
     for source, nav in flight.nav.items():
+        table = f"nav/{source}"
+        facts: dict[str, Any] = {"part": part_of(table)}
+        q = finite_rows(nav, QUATERNION)
+        if len(q) < ENOUGH or not q.any(axis=1).all():
+            continue
+        agreeing = float(np.linalg.norm(quaternion_to_matrix(q)[:, 2].mean(axis=0)))
+        if agreeing < TUMBLED:
+            yield Finding("problem", table, "q_w", "down-everywhere", facts | {"length": agreeing}, causes)
+            continue
         values = None if "frame_id" in nav else increasing_rows(nav, QUATERNION, ENOUGH)
-        if values is None or not np.abs(values[:, 1:]).any(axis=1).all():
+        if values is None:
             continue
         R = Rotation.from_quat(values[:, 1:], scalar_first=True)
         turned = np.cumsum((R[:-1].inv() * R[1:]).as_rotvec(), axis=0)
@@ -458,9 +472,8 @@ def turning(flight: Flight) -> Iterator[Finding]:
         first, last = intervals(t)
         rate = np.linalg.norm(turned[last] - turned[first], axis=1) / (t[last] - t[first])
         if len(rate) and (fast := rate > FASTEST).mean() > TUMBLING:
-            facts = {"turned": rate[fast].max() / (2 * np.pi), "part": part_of(f"nav/{source}")}
-            causes = ("attitude in degrees",)
-            yield Finding("problem", f"nav/{source}", "q_w", "turns-too-fast", facts, causes)
+            facts["turned"] = rate[fast].max() / (2 * np.pi)
+            yield Finding("problem", table, "q_w", "turns-too-fast", facts, causes)
 
 
 def _gravity(imu: Inertial, moved: Moves | None) -> Iterator[Finding]:
