@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from wildlab.analysis.georeference import CORNERS, covariances_of, georeference, observe, write_points
+from wildlab.analysis.georeference import (
+    CORNERS,
+    covariances_of,
+    georeference,
+    observe,
+    points_geojson,
+    write_points,
+)
+from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import geodetic_to_ned
 from wildlab.simulation.twins import simulate_twin
@@ -41,6 +50,17 @@ def test_points_lie_where_they_are_and_say_what_they_come_from(made):
     first = found[0]["properties"]
     assert (first["level"], first["source"], first["flight"]) == (0.9, "autopilot", flight.name)
     assert "ellipsoid" in first["vertical_reference"]
+
+
+@pytest.mark.parametrize(("taken_off", "ellipsoid"), [(0.0, False), (-32.0, True)])
+def test_heights_count_from_what_the_flight_says(made, taken_off, ellipsoid):
+    flight, points, _ = made
+    vertical = {"vertical": {"reference": "the quay", "correction_m": taken_off}}
+    other = replace(flight, manifest=replace_in_manifest(flight.manifest, vertical))
+    for text in (points_geojson(other, points), points_geojson(other, points, ellipses=True)):
+        said = {one["properties"]["vertical_reference"] for one in json.loads(text)["features"]}
+        assert len(said) == 1
+        assert ("ellipsoid" in said.copy().pop(), "the quay" in said.pop()) == (ellipsoid, not ellipsoid)
 
 
 def test_polygons_are_the_ellipses_of_ninety_per_cent(made):

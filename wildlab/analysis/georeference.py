@@ -413,7 +413,7 @@ def with_axes(points: pd.DataFrame) -> pd.DataFrame:
 
 def write_points(flight: Flight, points: pd.DataFrame, path: Path, source: str = "") -> None:
     """Write points as CSV (metres from the flight's origin), or as GeoJSON with their ellipses as polygons
-    (WGS84 longitude, latitude, of points the height above the ellipsoid).
+    (WGS84 longitude, latitude, of points the height above what the flight's heights count from).
 
     Parameters
     ----------
@@ -457,7 +457,9 @@ def points_geojson(flight: Flight, points: pd.DataFrame, source: str = "", *, el
     str
         One feature for each point that has a place.
     """
-    table = _described(flight, points, ELLIPSOID, source)
+    reference = flight.manifest.vertical.counted_from
+    counted = ELLIPSOID if reference == "ellipsoid" else f"height above {reference}"
+    table = _described(flight, points, counted, source)
     placed = table[table["north_m"].notna() & table["down_m"].notna()]
     degrees = _degrees(flight, placed[["north_m", "east_m", "down_m"]].to_numpy(float))
     places: list[object] = [[*row[:2].round(8).tolist(), round(float(row[2]), 3)] for row in degrees]

@@ -219,6 +219,11 @@ class VerticalPart(Strict):
     correction_m: float = 0.0
     note: str = ""
 
+    @property
+    def counted_from(self) -> str:
+        """What heights count from inside."""
+        return "ellipsoid" if self.correction_m else self.reference
+
 
 class UncertaintyPart(Strict):
     """Standard deviations to assume where the log has none. Absent = not assumed.

@@ -683,8 +683,8 @@ def clocks(flight: Flight) -> Iterator[Finding]:
     if manifest.mount.poses and manifest.mount.poses not in flight.nav:
         facts = {"poses": manifest.mount.poses, "names": ", ".join(sorted(flight.nav)) or "none"}
         yield Finding("problem", "flight.toml", "mount.poses", "mount-on-nothing", facts)
-    reference = manifest.vertical.reference
-    if reference != "ellipsoid" and manifest.vertical.correction_m == 0:
+    reference = manifest.vertical.counted_from
+    if reference != "ellipsoid":
         # Where nothing is placed on the ground, a constant height changes no result.
         placed = manifest.camera is not None or flight.truth is not None
         level: Level = "warning" if placed else "note"
