@@ -13,6 +13,8 @@ from tests import commands
 from tests.analysis.test_plan import FIELD
 from tests.flight.test_area import LAT, LON, collection, feature, polygon
 from tests.flight.test_mission_writers import check_plan, read_wpl
+from wildlab.flight.calibration_files import CameraFile, write_calibration
+from wildlab.flight.manifest import CameraPart
 from wildlab.reporting.plan import roomiest_place
 
 call, succeed, refuse = (partial(one, "plan") for one in (commands.call, commands.succeed, commands.refuse))
@@ -84,11 +86,21 @@ def test_a_folder_is_replaced_only_when_asked(area, tmp_path):
         (("--image", "640", "--view", "45"), "640x512"),
         ((*SHEET, "--camera", "x.toml"), "twice"),
         ((*SHEET, "--height", "-5"), "--height"),
+        (("--image", "640x512", "--focal", "13"), "--focal"),
     ],
 )
 def test_wrong_use_leaves_nothing(area, tmp_path, given, said):
     assert said.lower() in refuse(area, *given, "--out", tmp_path / "out").lower()
     assert not (tmp_path / "out").exists()
+
+
+def test_a_camera_file_in_millimetres_is_named(area, tmp_path):
+    camera = {"name": "a", "width_px": 640, "height_px": 512, "cx_px": 320.0, "cy_px": 256.0}
+    for name, focal in (("mm", 50.0), ("px", 764.0)):
+        file = CameraFile(camera=CameraPart(**camera, fx_px=focal, fy_px=focal))
+        write_calibration(file, tmp_path / f"{name}.toml")
+    assert "fx_px" in refuse(area, "--camera", tmp_path / "mm.toml", "--out", tmp_path / "out")
+    succeed(area, "--camera", tmp_path / "px.toml", "--out", tmp_path / "out")
 
 
 # -- over a map of heights
@@ -149,7 +161,9 @@ def test_maps_that_do_not_fit_are_refused(over_map, tmp_path):
     turned = folder / "turned.geojson"
     ring = [[b, a] for a, b in polygon(FIELD)["coordinates"][0]]
     turned.write_text(json.dumps({"type": "Polygon", "coordinates": [ring]}))
-    assert "order of their coordinates" in refused(dem, area=turned)
+    assert "exchanged" in refused(dem, area=turned)
+    # Without a map, a take-off point tells it.
+    assert "exchanged" in refuse(turned, *SHEET, "--height", 60, "--home", f"{LAT},{LON}", *into)
     holes = heights.copy()
     holes[:, 80:] = np.nan
     assert "% of Wolf" in refused(write_map(folder / "holes.tif", holes, corner))

@@ -774,10 +774,10 @@ def _home(home: tuple[float, float], areas: Areas) -> Array:
     far = float(np.hypot(*here))
     if not far <= FURTHEST_HOME:
         swapped = geodetic_to_ned(lon, lat, 0.0, areas.origin)[:2] if abs(home[1]) <= 90 else here
-        order = ": latitude and longitude are swapped" if np.hypot(*swapped) <= FURTHEST_HOME else ""
+        order = ", but with latitude and longitude exchanged" if np.hypot(*swapped) <= FURTHEST_HOME else ""
         raise WildlabError(
             f"the take-off point lies {far / 1000:,.0f} km from the areas{order}",
-            "give latitude, then longitude, in degrees",
+            "give it as latitude, then longitude; the file of the areas has longitude first",
             field="--home",
         )
     return here

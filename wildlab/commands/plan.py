@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -140,8 +141,6 @@ def lens(
     WildlabError
         Where nothing or too much is said, or it is no camera.
     """
-    import math
-
     from wildlab.flight.calibration_files import read_camera
     from wildlab.geometry.camera import Camera
 
@@ -151,6 +150,7 @@ def lens(
                 "the camera is described twice", "give --camera, or --image and a focal length"
             )
         c = read_camera(camera).camera
+        refuse_view(c.width_px, c.fx_px, camera, "fx_px")
         bends = (c.k1, c.k2, c.p1, c.p2, c.k3)
         return Camera(c.width_px, c.height_px, c.fx_px, c.fy_px, c.cx_px, c.cy_px, c.skew_px, bends)
     if image is None or (focal is None) == (view is None):
@@ -162,12 +162,26 @@ def lens(
     if not (2 <= columns <= 100_000 and 2 <= rows <= 100_000 and columns % 1 == 0 and rows % 1 == 0):
         problem = f"an image of {columns:g} x {rows:g} pixels"
         raise WildlabError(problem, "give whole numbers, as 640x512", field="--image")
-    length = math.nan if focal is None else focal
-    if view is not None:
-        if not 1 <= view <= 170:
+    if focal is None:
+        if not LEAST_VIEW <= (view or 0) <= MOST_VIEW:
             problem = f"a field of view of {view:g} degrees"
-            raise WildlabError(problem, "give one from 1 to 170", field="--view")
-        length = columns / 2 / math.tan(math.radians(view) / 2)
-    if not 1 <= length <= 1e6:
-        raise WildlabError(f"a focal length of {length:g} px", "give pixels above 1", field="--focal")
-    return Camera(int(columns), int(rows), length, length, columns / 2, rows / 2)
+            raise WildlabError(problem, f"give one from {LEAST_VIEW} to {MOST_VIEW}", field="--view")
+        focal = columns / 2 / math.tan(math.radians(view or 0) / 2)
+    refuse_view(columns, focal, None, "--focal")
+    return Camera(int(columns), int(rows), focal, focal, columns / 2, rows / 2)
+
+
+#: Degrees across an image.
+LEAST_VIEW, MOST_VIEW = 1, 150
+
+
+def refuse_view(columns: float, focal: float, file: Path | None, field: str) -> None:
+    """Refuse a focal length that no lens has: it is in another unit, or of another image."""
+    across = math.degrees(2 * math.atan2(columns / 2, focal))
+    if not 0.999 * LEAST_VIEW <= across <= 1.001 * MOST_VIEW:
+        raise WildlabError(
+            f"a focal length of {focal:g} px sees {across:.3g} degrees across {columns:g} px",
+            "give it in pixels: that in mm, times the columns, over the width of the sensor in mm",
+            file=file,
+            field=field,
+        )

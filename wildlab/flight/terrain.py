@@ -535,9 +535,14 @@ def _refuse_elsewhere(
     distance = float(np.hypot(*away))
     far = f"{distance / 1000:,.1f} km away" if distance >= 1000 else f"{distance:.0f} m away"
     far = far if math.isfinite(distance) else "beyond the reach of its own CRS"
+    fix = f"give another map, or check CRS and {also}"
+    longitude, latitude, height = ned_to_geodetic(positions, places.origin).T
+    latitude = np.where(np.abs(latitude) <= np.pi / 2, latitude, np.nan)
+    if over(places.of_points(geodetic_to_ned(latitude, longitude, height, places.origin))):
+        far, fix = f"{far}, but with latitude and longitude exchanged", f"exchange them in {also}"
     raise WildlabError(
         f"{what} over this map, whose nearest cell is {far}",
-        f"give another map, or check CRS and {also}",
+        fix,
         file=places.map.path,
         field="terrain",
     )
