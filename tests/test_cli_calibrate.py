@@ -1,6 +1,7 @@
 """`wildlab calibrate` and `wildlab evaluate --calibration`, through the real command."""
 
 import re
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,6 +10,8 @@ import pytest
 import wildlab
 from tests.analysis.survey_twin import Survey, simulate
 from tests.commands import refuse, succeed
+from tests.flight.checks.test_mistakes_named import euler
+from tests.sound_flights import simulate_sound_flight
 from wildlab.analysis.accuracy import corrected_flight
 from wildlab.analysis.georeference import truth_of
 from wildlab.analysis.tracks.tracker import read_inputs
@@ -155,3 +158,17 @@ def test_a_kept_calibration_moves_points_and_tracks_as_the_corrections_by_hand_d
         R = inputs.scans.poses.R_nc
         assert np.allclose(R, other[name].scans.poses.R_nc, atol=1e-12)
         assert not np.allclose(R, logged[name].scans.poses.R_nc, atol=0.01)
+
+
+def test_poses_that_a_check_doubts_teach_only_when_asked_to(tmp_path, monkeypatch):
+    """Roll and pitch exchanged: a warning, since the nose of an aircraft may point elsewhere."""
+    flight = simulate_sound_flight("fixed wing", 1)
+    alone = replace(flight, tables={name: flight.tables[name] for name in ("frames", "detections", "truth")})
+    wrong = euler("nav/autopilot", lambda e: e[:, [1, 0, 2]])(alone)
+    save_flight(wrong, tmp_path / "wrong")
+    gain = SimpleNamespace(gain=Interval(np.nan, np.nan, np.nan))
+    winner = SimpleNamespace(causes=(), gain=gain)
+    learn(monkeypatch, winner=winner, models=[winner], ranked=SimpleNamespace(rivals=()))
+    call = ("calibrate", tmp_path / "wrong", "--out", tmp_path / "c.toml")
+    assert "--despite-warnings" in refuse(*call)
+    succeed(*call, "--despite-warnings")

@@ -5,17 +5,21 @@ from __future__ import annotations
 import json
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import pytest
 from click.testing import CliRunner
 
 from tests.analysis.survey_twin import Survey, simulate
 from tests.annotation import write_images
+from tests.commands import succeed
 from wildlab.analysis import camera as module
+from wildlab.analysis.accuracy import as_calibrated, learn_flight
 from wildlab.analysis.camera import CameraClock
 from wildlab.cli import wildlab
 from wildlab.errors import WildlabError
-from wildlab.flight.store import save_flight
+from wildlab.flight.calibration_files import LearntParameter
+from wildlab.flight.store import load_flight, save_flight
 
 
 def clock(sentence: str, certain: bool) -> CameraClock:
@@ -56,3 +60,16 @@ def test_known_points_tell_it_where_motion_does_not(motion, points, said, tmp_pa
     told = json.loads(ran.stdout)["sentence"]
     assert said in told
     assert ("points" in told) == (told != "motion say so.")
+
+
+def test_what_a_kept_calibration_adds_is_not_set_again(tmp_path):
+    late = LearntParameter(name="clock", value=0.3, low=0.2, high=0.4, unit="s")
+    flight = simulate(Survey(images=12, clock_s=0.5))
+    kept = learn_flight(flight, np.random.default_rng(0))[0]
+    kept = kept.model_copy(update={"parameter": (late,), "covariance": ((0.0025,),)})
+    folder = save_flight(flight, tmp_path / "flight", calibration=kept).folder
+    for found in ([], ["--offset", "0.5"]):
+        succeed("clock", folder, "--set", *found)
+        set_ = load_flight(folder)
+        assert set_.manifest.clocks.camera_offset_s == pytest.approx(0.2, abs=0.15)
+        assert as_calibrated(set_).manifest.clocks.camera_offset_s == pytest.approx(0.5, abs=0.15)

@@ -165,7 +165,8 @@ def clock(
     It is what has to be added to the stamps of FLIGHT's images. With --images, from the motion of the images
     against the turning that the log has; without, or where that does not tell it, from known points that were
     seen. --offset takes a number that is known otherwise (F 6.3.3). An offset that does not stand out is said
-    to be uncertain, and --set refuses it.
+    to be uncertain, and --set refuses it. What a calibration that the flight keeps adds to the stamps is not
+    set again.
 
     \b
     Examples:
@@ -207,10 +208,18 @@ def clock(
         )
     from dataclasses import replace
 
+    from wildlab.flight.calibration_files import read_learnt
     from wildlab.flight.manifest import replace_in_manifest
     from wildlab.flight.store import save_flight
 
-    change = {"clocks": {"camera_offset_s": round(float(str(said["offset_s"])), 4)}}
+    kept = () if loaded.calibration is None else read_learnt(loaded.calibration).parameter
+    # What the calibration adds is added whenever the flight is read with it.
+    by_calibration = sum(one.value for one in kept if one.name == "clock")
+    stated = round(float(str(said["offset_s"])) - by_calibration, 4)
+    if by_calibration:
+        added = fact("clock-calibrated", offset_s=f"{by_calibration:+.3f}", stated_s=f"{stated:+.3f}")
+        click.echo(" ".join(words("terminal", [added])), err=True)
+    change = {"clocks": {"camera_offset_s": stated}}
     changed = replace(loaded, manifest=replace_in_manifest(loaded.manifest, change))
     save_flight(changed, flight, overwrite=True)
     click.echo(f'Next: wildlab check "{shown(flight)}"', err=True)
@@ -249,16 +258,25 @@ def _estimate(flight: Flight, images: Path | None, source: str | None) -> Camera
 @shared.out(FILE, "The file to write: calibration.toml.", required=True)
 @shared.overwrite
 @shared.source
+@click.option("--despite-warnings", is_flag=True, help="Even if a check doubts its poses.")
 @shared.seed
 @shared.as_json
-def calibrate(flight: Path, out: Path, overwrite: bool, source: str | None, seed: int, as_json: bool) -> None:
+def calibrate(
+    flight: Path,
+    out: Path,
+    overwrite: bool,
+    source: str | None,
+    despite_warnings: bool,
+    seed: int,
+    as_json: bool,
+) -> None:
     """Learn on FLIGHT what the next one is corrected by.
 
     On its known points: what is constantly wrong with position, boresight, clock or lens. Without truth,
     things that several images show serve as well. Only what gained something for certain on images that it
     was not estimated from, and nothing else explains as well, is written down, with its covariance; how noisy
-    the poses were always is. Judge it on another flight. A flight whose logs contradict each other teaches
-    nothing.
+    the poses were always is. Judge it on another flight. A flight whose logs contradict each other, or of
+    whose poses a check warns, teaches nothing.
 
     \b
     Examples:
@@ -269,19 +287,22 @@ def calibrate(flight: Path, out: Path, overwrite: bool, source: str | None, seed
 
     from wildlab.analysis.accuracy import learn_flight
     from wildlab.flight.calibration_files import write_calibration
-    from wildlab.flight.checks.check import sense_sentences
+    from wildlab.flight.checks.check import find
     from wildlab.flight.store import load_flight
     from wildlab.reporting.georeferencing import words_of_causes
     from wildlab.reporting.georeferencing_tables import simplest_rivals
 
     refuse_existing(out, overwrite)
     loaded = load_flight(flight)
-    if problems := [one for one in sense_sentences(loaded) if one.startswith("problem")]:
-        raise WildlabError(
-            f"its logs contradict each other ({len(problems)} problem{'s' * (len(problems) > 1)})",
-            "mend that first: wildlab check says what it is",
-            file=flight,
-        )
+    poses = {f"nav/{name}" for name in ([source] if source else loaded.estimated_sources)}
+    for doubt in find(loaded, plain=False):
+        if doubt.level == "problem":
+            raise WildlabError(f"its logs contradict each other: {doubt.clause}", doubt.remedy, file=flight)
+        if doubt.level == "warning" and doubt.table in poses and not despite_warnings:
+            remedy = f"{doubt.remedy}; or add --despite-warnings"
+            raise WildlabError(
+                f"its poses are in doubt: {doubt.clause}", remedy, file=flight, field=doubt.table
+            )
     learnt, diagnosis = learn_flight(loaded, np.random.default_rng(seed), source)
     write_calibration(learnt, out)
     if as_json:
