@@ -62,6 +62,10 @@ def test_what_is_refused(tmp_path):
     settings.write_text("[targets]\nsped = 3\n")
     assert "sped" in refuse("track", flight, "--settings", settings)
     assert "flight.toml" in refuse("track", tmp_path)
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "report.html").write_text("the first")
+    assert "--overwrite" in refuse("track", flight, "--out", tmp_path / "out")
+    assert (tmp_path / "out" / "report.html").read_text() == "the first"
 
 
 @pytest.mark.slow

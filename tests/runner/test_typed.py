@@ -58,7 +58,7 @@ def test_a_report_that_failed_is_asked_for_again_as_it_was(tmp_path, monkeypatch
     evaluate.evaluate_flight(folder, reports=tmp_path / "reports")
     start = "wildlab track 'flights/my boat'"
     assert jobs[0].again == (
-        f"{start} --filter ekf --filter ukf --sensor radar --settings s.toml --smooth --out out"
+        f"{start} --filter ekf --filter ukf --sensor radar --settings s.toml --smooth --out out --overwrite"
     )
-    assert jobs[1].again == f"{start} --many --sensor radar --settings s.toml --out out"
+    assert jobs[1].again == f"{start} --many --sensor radar --settings s.toml --out out --overwrite"
     assert {job.again for job in jobs[2:]} == {"wildlab evaluate 'flights/my boat' --out reports"}

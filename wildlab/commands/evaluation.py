@@ -140,6 +140,7 @@ def georeference(flight: Path, out: Path, overwrite: bool, source: str | None, s
 @click.option("--smooth", is_flag=True, help="Also backwards in time.")
 @shared.source
 @shared.out(FOLDER, "The report's folder.  [default: reports/NAME-tracking, or NAME-many]")
+@shared.overwrite
 def track(
     flight: Path,
     tune: Path | None,
@@ -152,6 +153,7 @@ def track(
     smooth: bool,
     source: str | None,
     out: Path | None,
+    overwrite: bool,
 ) -> None:
     """Track the targets of FLIGHT by any sensor.
 
@@ -172,6 +174,8 @@ def track(
       wildlab track flights/harbour --settings settings.toml --target boat --sensor radar
       wildlab track flights/harbour --many --settings settings.toml
     """
+    if out is not None:
+        refuse_existing(out / "report.html", overwrite)
     start_server()
     from wildlab.runner.track import refuse_unfit, track_flight, track_many
 

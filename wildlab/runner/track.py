@@ -219,9 +219,8 @@ def _run_report(
     folder = cast(Path, flight.folder)
     refuse_other_flight(folder, place)
     place.parent.mkdir(parents=True, exist_ok=True)
-    again = typed_in_report(
-        "wildlab track", folder, **options, out=into or (other_reports(reports) and place)
-    )
+    out = into or (other_reports(reports) and place)
+    again = typed_in_report("wildlab track", folder, **options, out=out, overwrite=out is not None)
     job = make_job(
         study, flight=folder, reports=place.parent, notebooks=notebooks, name=place.name, again=again
     )
