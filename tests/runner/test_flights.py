@@ -151,6 +151,13 @@ def test_a_flight_named_like_a_study_would_replace_its_report(tmp_path, make_fli
         evaluate_flight(tmp_path / "s", notebooks=studies(tmp_path / "notebooks"), reports=tmp_path / "out")
 
 
+def test_folders_whose_names_differ_have_reports_of_their_own(tmp_path, make_flight):
+    for folder in ("Flight A", "Flight B"):
+        save_flight(make_flight(name="card"), tmp_path / folder)
+    names = {load_flight(tmp_path / folder).name for folder in ("Flight A", "Flight B")}
+    assert len(names - {"card"}) == 2
+
+
 def left_report(flight: Path, reports: Path) -> None:
     """What a report on a flight is told by, as a run leaves it."""
     refuse_other_flight(flight, reports / "tuesday")

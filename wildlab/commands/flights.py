@@ -135,8 +135,9 @@ def _card(raw: tuple[Path, ...], out: Path | None, wishes: dict[str, Any]) -> Pr
 
 def _wishes(raw: tuple[Path, ...], out: Path | None, wishes: dict[str, Any]) -> Wishes:
     from wildlab.flight.calibration_files import read_camera
-    from wildlab.flight.card import Wishes, safe_name
+    from wildlab.flight.card import Wishes
     from wildlab.flight.clock_fitting import find_zone
+    from wildlab.flight.files import safe_name
 
     start = None
     if wishes["start"] is not None:

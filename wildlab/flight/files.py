@@ -76,16 +76,22 @@ def is_safe_name(name: str) -> bool:
     return SAFE_NAME.fullmatch(name) is not None
 
 
+def safe_name(text: str, otherwise: str = "flight") -> str:
+    """The nearest safe name to a text, or another one where it has no letter of those."""
+    name = re.sub(r"[^A-Za-z0-9_-]+", "-", text).strip("-_")[:100]
+    return name if is_safe_name(name) else otherwise
+
+
 def flight_name(folder: Path, stated: str) -> str:
-    """What a flight and its reports are called: as its folder, or as stated where that is no safe name.
+    """What a flight and its reports are called: as its folder, or as stated where that has no such letters.
 
     Examples
     --------
-    >>> flight_name(Path("flights/trial"), "slow-vessel-1"), flight_name(Path("flights/my day"), "my-day")
+    >>> flight_name(Path("flights/trial"), "slow-vessel-1"), flight_name(Path("flights/my day"), "card")
     ('trial', 'my-day')
     """
     name = folder.resolve().name
-    return name if is_safe_name(name) else stated
+    return name if is_safe_name(name) else safe_name(name, stated)
 
 
 def leaves_folder(name: str) -> bool:
