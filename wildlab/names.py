@@ -1,10 +1,11 @@
 """Names that strangers gave to things, made harmless where they are shown: the one door into figures, pages
-and tables; and several in a row."""
+and tables; several in a row; and which of them mean the same image."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import PurePosixPath
 
 #: With what a spreadsheet takes the value of a cell for a formula.
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
@@ -67,3 +68,32 @@ def listed(parts: Sequence[str], last: str = "and") -> str:
     ('roll, pitch and yaw', 'a or b', 'a')
     """
     return "".join(parts) if len(parts) < 2 else f"{', '.join(parts[:-1])} {last} {parts[-1]}"
+
+
+def plain_path(name: str) -> PurePosixPath:
+    """A path as any system writes it."""
+    return PurePosixPath(name.replace("\\", "/"))
+
+
+def match_names(there: Iterable[str]) -> Callable[[str], str | None]:
+    """What finds a name among those of images: as written, else the only one that is the same without folders
+    and capitals, or without the ending too; other programs write names in all of these ways.
+
+    Examples
+    --------
+    >>> match_names(["IMG_1.JPG", "IMG_2.JPG"])("set/images/img_2.png")
+    'IMG_2.JPG'
+    """
+    names = dict.fromkeys(there)
+    alike: dict[str, list[str]] = {}
+    for name in names:
+        place = plain_path(name.casefold())
+        for key in {place.name, place.stem}:
+            alike.setdefault(key, []).append(name)
+
+    def match(name: str) -> str | None:
+        place = plain_path(name.casefold())
+        found = ([name] if name in names else alike.get(place.name) or alike.get(place.stem)) or []
+        return found[0] if len(found) == 1 else None
+
+    return match

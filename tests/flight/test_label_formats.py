@@ -194,6 +194,7 @@ def test_numbers_of_a_clip_and_names_without_ending(tmp_path):
         table(tmp_path / "n.csv", "image,x,y,w,h\na.png,1,2,3,4\nb.png,1,2,3,4\nb.jpg,1,2,3,4\n")
     )
     assert files.name_of("a") == "a.png" and files.name_of("b") is None
+    assert files.name_of("A.PNG") == files.name_of("A.JPG") == "a.png"
 
 
 @pytest.mark.parametrize(

@@ -291,8 +291,11 @@ def samples_of(frames: Frames, labels: Labels) -> list[Sample]:
     step = max(1, -(-len(labels.boxes) // MOST_FRAMES))
     found = []
     seen = 0
+    strange: list[str] = []
     for frame in frames:
         name = labels.name_of(frame.name)
+        if name is None:
+            strange.append(frame.name)
         if name is None or not frame.usable:
             continue
         seen += 1
@@ -301,6 +304,8 @@ def samples_of(frames: Frames, labels: Labels) -> list[Sample]:
         height, width = frame.image.shape[:2]
         boxes, ignore = labels.boxes_of(frame.name, name, width, height)
         found.append(Sample(frame, boxes, ignore, labels.group[name]))
+    if strange and not seen:
+        raise labels.of_other_frames(strange)
     return found
 
 

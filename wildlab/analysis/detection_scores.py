@@ -189,10 +189,7 @@ def judge_detections(detections: pd.DataFrame, frames: pd.DataFrame, labels: Lab
         rows += [(frame, word, *boxes[row], scored.scores[row]) for word, which in verdicts for row in which]
         rows += [(frame, "missed", *true[row], np.nan) for row in found.missed]
     if not counts:
-        raise WildlabError(
-            f"the labels name {len(labels.boxes)} frames, and none of them is here",
-            "give the labels of these frames: names are file names, numbers count a clip's frames from 0",
-        )
+        raise labels.of_other_frames(frames["frame_id"])
     things = pd.DataFrame(rows, columns=["frame_id", "verdict", *_BOX, "score"])
     absent = tuple(sorted(set(labels.boxes) - {one.name for one in judged}))
     return DetectorScore(

@@ -35,7 +35,7 @@ from wildlab.flight.card_items import (
     source_folder,
     span_of,
 )
-from wildlab.flight.files import dump_toml, is_safe_name, printable, read_toml
+from wildlab.flight.files import dump_toml, printable, read_toml
 from wildlab.flight.heights import NO_GRID, HeightPlan, HeightUse, choose_reference
 from wildlab.flight.importing import import_flight
 from wildlab.flight.manifest import CameraPart, TerrainSays
@@ -43,6 +43,7 @@ from wildlab.flight.readers.clicks import note_of_kinds
 from wildlab.flight.readers.log import PARTS, Stream
 from wildlab.flight.schema import QUATERNION
 from wildlab.flight.store import Flight
+from wildlab.names import match_names
 from wildlab.paths import DATA
 
 #: Rows that can be used.
@@ -413,7 +414,7 @@ class Proposal:
         frames, clicks = self.data["frames"], self.by_role["clicks"]
         level = self._level()
         photos = stream_of(images, "photos")
-        known = {*_stems(photos), *map(str, photos.columns["file"])}
+        match = match_names(map(str, photos.columns["file"]))
         blocks = []
         for number, one in enumerate(clicks, 1):
             stream = stream_of(one, "clicks")
@@ -431,8 +432,7 @@ class Proposal:
             if level is not None:
                 block["ground"] = {"height": {"value": level, "unit": "m"}}
             self.logs[block["file"]]["images"] = frames["file"]
-            of = map(str, stream.columns["image"][stream.used])
-            strange = sum(known.isdisjoint((name, PurePosixPath(name).stem)) for name in of)
+            strange = sum(match(str(name)) is None for name in stream.columns["image"][stream.used])
             if strange:
                 self.notes.append(
                     f"{one.item.shown}: {strange} of {len(stream)} pixels are of no image here, and left out."
@@ -740,12 +740,6 @@ def import_card(
         flight = import_flight(path, card.source, into, overwrite, calibration, terrain)
     write_atomic(beside, card.recipe.encode("utf-8"))
     return flight
-
-
-def safe_name(text: str) -> str:
-    """A flight's name out of a folder's."""
-    name = re.sub(r"[^A-Za-z0-9_-]+", "-", text).strip("-_")[:100]
-    return name if is_safe_name(name) else "flight"
 
 
 #: Headings of `rows_of`.

@@ -41,6 +41,8 @@ IMAGES = frozenset(SUFFIXES)
 KNOWN_OTHERS = frozenset({".mp4", ".mov", ".lrv", ".thm", ".dng", ".lrf", ".toml", ".md", ".txt", ".parm"})
 #: Why such a file is not read.
 OTHER = "is no log by its ending"
+#: How the problem of a table begins whose columns nobody explained.
+TABLE = "a plain table"
 #: More files than any card of a day's flights has.
 MOST_FILES = 200_000
 
@@ -223,7 +225,7 @@ def _read(path: Path, name: str, folder: str, zone: str | None) -> CardItem:
 def _unknown(head: bytes) -> str:
     if len(header_of(head)) > 1:
         recipe = "a recipe says what its columns are (data/recipes/README.md, which `wildlab doctor` finds)"
-        return f"a plain table: {recipe}; then wildlab import recipe.toml --source FOLDER"
+        return f"{TABLE}: {recipe}; then wildlab import recipe.toml --source FOLDER"
     return "is empty" if not head else "no reader knows this format"
 
 
@@ -298,7 +300,7 @@ def choose_roles(found: Sequence[CardItem], stated: Mapping[str, str]) -> list[C
     own = next((one.item for one in choices.values() if one.role == "own"), None)
     images = _images(found, choices)
     if own is None and open_:
-        own, why = _own(open_, images)
+        own, why = _own(open_, images, any(one.problem.startswith(TABLE) for one in found))
         if own is not None:
             choices[own.key] = Choice(own, "own", why)
     for one in open_:
@@ -366,9 +368,8 @@ def _first(one: CardItem, stated: tuple[str, str] | None) -> Choice:
             return Choice(one, role, f"it has {len(one.log.parts[part])} {PARTS_SHOWN[part]}")
     if one.part("poses") is None and one.part("gnss") is None:
         if one.part("triggers") is not None:
-            return Choice(
-                one, "triggers", f"it has {len(one.log.parts['triggers'])} records of triggers alone"
-            )
+            why = f"it has {len(one.log.parts['triggers'])} records of triggers alone"
+            return Choice(one, "triggers", why)
         return Choice(one, "nothing", _useless(one))
     return Choice(one, "", "")
 
@@ -392,10 +393,11 @@ def _images(found: Sequence[CardItem], choices: Mapping[str, Choice]) -> CardIte
     return max(folders, key=lambda one: len(one.log.parts["photos"]) if one.log else 0, default=None)
 
 
-def _own(open_: Sequence[CardItem], images: CardItem | None) -> tuple[CardItem | None, str]:
+def _own(open_: Sequence[CardItem], images: CardItem | None, unread: bool) -> tuple[CardItem | None, str]:
     """The vehicle's own log, with the reason: what turns, covers the images, triggers, flies and climbs, in
     this order, and of those that are alike the longest. Where the images have poses of their own and no log
-    turns, the one that was where they say that the camera was, or None."""
+    turns, the one that was where they say that the camera was, or None; None, too, where none turns or is
+    known to fly beside an unread table."""
     turned = [one for one in open_ if any(one.part(part) is not None for part in ("poses", "gimbal"))]
     if not turned and images is not None and has_place(images):
         for one in open_:
@@ -403,6 +405,8 @@ def _own(open_: Sequence[CardItem], images: CardItem | None) -> tuple[CardItem |
             if _on_board(distance, above):
                 return one, f"it is mostly within {distance:.1f} m of the images"
         return None, ""
+    if unread and not turned and not any(map(_flies, open_)):
+        return None, ""  # the table may be the vehicle's
     if len(open_) == 1:
         return open_[0], "it is the only log"
     taken = span_of(images, ["photos"]) if images is not None else None
@@ -471,11 +475,8 @@ def _other(one: CardItem, own: CardItem | None, images: CardItem | None) -> Choi
     if _on_board(distance, above):
         near = f"it is mostly within {distance:.1f} m of the vehicle's own log"
         return Choice(one, "camera" if one.part("poses") is not None else "receiver", near)
-    return Choice(
-        one,
-        "target",
-        f"it is {distance:.0f} m beside{height} the vehicle (medians), for {_lasting(shared)} of its flight",
-    )
+    why = f"it is {distance:.0f} m beside{height} the vehicle (medians), for {_lasting(shared)} of its flight"
+    return Choice(one, "target", why)
 
 
 def _on_board(distance: float, above: float) -> bool:

@@ -39,6 +39,7 @@ from wildlab.flight.readers.log import RawLog, Stream
 from wildlab.flight.readers.photos import of_camera
 from wildlab.flight.recipes import Decimal, LogTable, MatlabTable, Quantity, Series, Stamp
 from wildlab.flight.schema import Dimension, factor
+from wildlab.names import match_names
 
 _WHOLE = re.compile(r"[-+]?\d+", re.ASCII)
 #: Rows that are Python strings at a time.
@@ -732,23 +733,23 @@ def _by_time(stream: Stream) -> Stream:
 
 
 def of_images(pixels: Stream, images: Stream) -> Stream:
-    """Pixels, those marked as not used that are of no image with a time."""
+    """Pixels by the names of their images, those marked as not used that are of no image with a time."""
     there = np.ones(len(images), bool)
     times = images.columns.get("time_s")
     if times is not None and np.isfinite(times).any():
         there = np.isfinite(times)
-    known = {str(one) for name in ("file", "stem") for one in images.columns[name][there]}
-    strange = np.array(
-        [
-            str(a) not in known and str(b) not in known
-            for a, b in zip(pixels.columns["image"], pixels.columns["stem"], strict=True)
-        ],
-        bool,
-    )
+    rows = {str(one): row for row, one in enumerate(images.columns["file"])}
+    match = match_names(rows)
+    found = {one: rows.get(match(str(one)) or "", -1) for one in dict.fromkeys(pixels.columns["image"])}
+    row = np.array([found[one] for one in pixels.columns["image"]], int)
+    strange = (row < 0) | ~there[row]
     use, why = pixels.columns["use"].copy(), pixels.columns["why"].copy()
     why[strange & (use == 1.0)] = "its image is not there"
     use[strange] = 0.0
-    return Stream({**pixels.columns, "use": use, "why": why}, pixels.rows, pixels.counted_in)
+    columns = {**pixels.columns, "use": use, "why": why}
+    for name, of in (("image", "file"), ("stem", "stem")):
+        columns[name] = np.where(row < 0, pixels.columns[name], np.asarray(images.columns[of], object)[row])
+    return Stream(columns, pixels.rows, pixels.counted_in)
 
 
 def match_images(images: Stream, of_record: Array) -> TriggerMatch | None:

@@ -56,6 +56,18 @@ def test_points_of_a_card_lie_where_they_were_surveyed(card, tmp_path):
     assert set(points["target_id"]) <= set(MARKS)
 
 
+def test_clicks_know_their_images_whatever_folder_and_capitals(card, tmp_path):
+    usual = import_card(read(card), tmp_path / "usual").table("detections")
+    head, *rows = (card / "clicks.csv").read_text(encoding="utf-8").splitlines()
+    for write in (str.swapcase, "C:\\set\\{}".format):
+        renamed = [",".join([write(image), *rest]) for image, *rest in (row.split(",") for row in rows)]
+        (card / "clicks.csv").write_text("\n".join([head, *renamed]) + "\n", encoding="utf-8")
+        proposal = read(card)
+        assert not [one for one in proposal.notes if "of no image" in one]
+        found = import_card(proposal, tmp_path / "renamed", overwrite=True).table("detections")
+        assert len(usual) and found.equals(usual)
+
+
 def test_the_recipe_beside_a_flight_makes_it_again(card, tmp_path):
     first = import_card(read(card), tmp_path / "flight")
     again = import_flight(recipe_beside(tmp_path / "flight"), card, tmp_path / "again")

@@ -7,6 +7,7 @@ import pymap3d
 import pytest
 
 from wildlab.errors import WildlabError
+from wildlab.flight import card_items
 from wildlab.flight.card_items import CardItem, choose_roles
 from wildlab.flight.readers.log import RawLog, make_stream
 
@@ -46,6 +47,7 @@ def holding(name: str, vehicle: str = "", **parts: dict[str, Any]) -> CardItem:
 
 DRONE = log("drone", attitude=True)
 BOAT = log("boat", north=80.0)
+TABLE = CardItem("flight.csv", problem=card_items.TABLE)
 PLACE: dict[str, Any] = {"latitude_deg": [59.0], "longitude_deg": [10.0]}
 MARKS = holding("marks", marks={"name": ["a"], **PLACE})
 PHOTOS = holding("DCIM", photos={"file": ["a.jpg"], "time_log_s": [START], "height_sea_m": [80.0], **PLACE})
@@ -101,6 +103,11 @@ def photographed(hours: float, up: float) -> CardItem:
             {},
             "nothing own target nothing",
         ),
+        # A track beside a table that nobody explained: the table may be of the vehicle.
+        ([TABLE, log("phone")], {}, "nothing target"),
+        ([TABLE, log("phone")], {"phone": "own"}, "nothing own"),
+        ([TABLE, log("plane", vehicle="ArduPlane V4.5")], {}, "nothing own"),
+        ([TABLE, DRONE, BOAT], {}, "nothing own target"),
         ([DRONE, log("copy", attitude=True)], {}, "own nothing"),
         ([DRONE, log("rtk", north=1e-6)], {}, "own receiver"),
         ([DRONE, BOAT, log("same", north=80.0)], {"boat": "target"}, "own target target"),

@@ -25,7 +25,6 @@ from wildlab.flight.readers.labels import (
     Marked,
     bare_names,
     box_table,
-    plain_path,
     read_json_boxes,
     read_table,
     read_yolo_folder,
@@ -34,6 +33,7 @@ from wildlab.flight.readers.labels import (
 from wildlab.flight.readers.log import RawLog, Stream, holding, named
 from wildlab.flight.readers.photos import read_tags, size_of
 from wildlab.flight.readers.text import header_of, number, parse_xml, plural, told
+from wildlab.names import plain_path
 
 #: Attributes of CVAT that name a thing more closely than its label.
 ATTRIBUTES = frozenset({"name", "target", "target_id", "id", "marker"})

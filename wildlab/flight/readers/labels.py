@@ -10,10 +10,10 @@ which is that of the images that lie beside; without one such rows say so and ar
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
@@ -34,6 +34,7 @@ from wildlab.flight.readers.text import (
     plain,
     read_text_table,
 )
+from wildlab.names import match_names
 
 Array = NDArray[np.float64]
 
@@ -98,10 +99,6 @@ def box_table(rows: Sequence[tuple[Any, ...]]) -> pd.DataFrame:
     return table.assign(score=table["score"].astype(float), row=np.arange(1, len(table) + 1))
 
 
-def plain_path(name: str) -> PurePosixPath:
-    return PurePosixPath(name.replace("\\", "/"))
-
-
 @dataclass(frozen=True, eq=False)
 class Labels:
     """What was marked in the frames of one folder or clip.
@@ -133,14 +130,8 @@ class Labels:
     path: Path
 
     @cached_property
-    def _by_ending(self) -> dict[str, list[str]]:
-        """Names without their folders, and without folders and endings."""
-        found: dict[str, list[str]] = {}
-        for name in self.boxes:
-            place = plain_path(name)
-            for key in {place.name, place.stem}:
-                found.setdefault(key, []).append(name)
-        return found
+    def _match(self) -> Callable[[str], str | None]:
+        return match_names(self.boxes)
 
     def name_of(self, frame: str) -> str | None:
         """The name that the file has for a frame, None where it does not name it.
@@ -160,13 +151,16 @@ class Labels:
         name = str(int(number)) if by_number and number.isdecimal() else frame
         if name in self.boxes:
             return name
-        # A flight may name its frames without the ending of their files, and so may the labels; other
-        # programs name them with their folder.
-        for key in (frame, Path(frame).stem) if self.marked.by != "number" else ():
-            same = self._by_ending.get(key, [])
-            if len(same) == 1:
-                return same[0]
-        return None
+        return None if self.marked.by == "number" else self._match(frame)
+
+    def of_other_frames(self, frames: Iterable[str]) -> WildlabError:
+        """What is said where the file names none of the frames."""
+        first, here = (printable(next(iter(one), "none")) for one in (self.boxes, frames))
+        return WildlabError(
+            f"names {len(self.boxes)} frames (the first is {first}), and none of those here (first: {here})",
+            "give the labels of these frames: names are file names, numbers count a clip's frames from 0",
+            file=self.path,
+        )
 
     def boxes_of(self, frame: str, name: str, width: int, height: int) -> tuple[Array, Array]:
         """What is marked in a frame, and where it is not judged, in px.
