@@ -53,9 +53,9 @@ def test_where_no_filter_is_consistent_the_least_error_leads():
     assert leading_filter(rows(rmse=np.nan, nees=np.nan, verdict="not judged")) == "ekf"
 
 
-@pytest.mark.parametrize(("nis", "level"), [(4.0, "good"), (5.0, "warn"), (20.0, "warn")])
+@pytest.mark.parametrize(("nis", "level"), [(2.5, "good"), (3.15, "warn"), (20.0, "warn")])
 def test_a_filter_that_its_detections_surprise_is_looked_at(nis, level):
-    # Of two elements: 1.5 times is 4.5.
+    # Of two elements: 1.15 times is 2.6.
     odd = rows(nis=nis, nis_verdict="overconfident")
     assert colour(odd) == level
     assert ("surprised" in keys(odd)) == (level == "warn")

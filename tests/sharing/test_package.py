@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -77,13 +78,30 @@ def test_what_a_machine_left_when_it_stopped_goes_with_the_next_run(tmp_path, mo
     assert {one.name for one in tmp_path.iterdir()} == {"wildlab-share-link", "wildlab-share-results"}
     out = tmp_path / "out"
     out.mkdir()
-    (out / ".copy.html.x7_kq2ab").write_text("half of what is for the sender alone")
+    half = out / ".copy.html.x7_kq2ab"
+    half.write_text("half of what is for the sender alone")
+    os.utime(half, (time.time() - 4000,) * 2)
     (out / ".copy.html.swp").write_text("an editor's")
     (out / ".copy.html.whatever").mkdir()
     put(b"whole", out / "copy.html", overwrite=False, mode=0o600)
     left = {one.name for one in out.iterdir()}
     assert left == {"copy.html", ".copy.html.swp", ".copy.html.whatever"}
     assert (out / "copy.html").stat().st_mode & 0o077 == 0
+
+
+def test_copies_that_are_written_at_once_leave_each_other_alone(tmp_path):
+    there = tmp_path / "copy.html"
+
+    def write(number: int) -> None:
+        with private_folder() as work:
+            (work / "page.html").write_text("work")
+            for _ in range(20):
+                put(bytes([number]) * 100_000, there, overwrite=True)
+
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(write, range(8)))
+    assert len(set(there.read_bytes())) == 1 and there.stat().st_size == 100_000
+    assert [one.name for one in tmp_path.iterdir()] == ["copy.html"]
 
 
 KILLED = """

@@ -28,6 +28,7 @@ from wildlab.analysis.tracks.tracker import (
     verdict,
 )
 from wildlab.analysis.verdict import Evidence, Verdict, verdict_of
+from wildlab.evaluation.ellipses import CLEAR
 from wildlab.flight.store import Flight
 from wildlab.messages.catalogue import Message, load_texts
 from wildlab.messages.quantities import NOTHING, length, significant
@@ -39,8 +40,6 @@ from wildlab.reporting.report import Report, Wording
 ALIKE = 1.2
 #: A mean outside of its band by less than this factor may be so by chance, where few values are independent.
 NEAR_THE_BAND = 1.5
-#: Detections may fall this many times as far from where they are expected as predicted.
-SURPRISED = 1.5
 #: Targets by sensors that are drawn; the table has all.
 MOST_DRAWN = 4
 _RECORDED = (
@@ -114,8 +113,9 @@ def on_few(row: pd.Series, what: str = "nees") -> bool:
 
 
 def surprised(rows: pd.DataFrame) -> pd.DataFrame:
-    """Tracks whose detections are not where they expect them, whatever their errors."""
-    beyond = np.sqrt(rows["nis"] / rows["dof"]) > SURPRISED
+    """Tracks whose detections are not where they expect them, whatever their errors: the mean NIS is above
+    its band, and by so much that it matters."""
+    beyond = np.sqrt(rows["nis"] / rows["dof"]) > CLEAR
     beyond &= rows["nis_verdict"] == OVERCONFIDENT
     return rows[beyond & ~rows.apply(on_few, axis=1, what="nis")]
 

@@ -294,7 +294,7 @@ def tell(facts: Facts) -> Story:
         Message(f"verdict.{_key(facts)}"),
         _why(facts),
         _next(facts, advice),
-        facts.verdict in (Verdict.FIX, Verdict.SOUND),
+        facts.verdict in (Verdict.FIX, Verdict.SOUND) and not facts.doubted and not _too_sure(facts),
         tuple(_tiles(facts)[:4]),
         tuple(_measured(facts)[:MOST]),
         _cut(_wrong(facts)),

@@ -12,6 +12,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -494,8 +495,13 @@ def zip_bytes(files: Mapping[str, bytes], password: str | None = None) -> bytes:
     return whole.getvalue()
 
 
+#: Nobody writes longer than that on a copy (s).
+LEFT_S = 3600.0
+
+
 def put(content: bytes, target: Path, overwrite: bool, mode: int = 0o644) -> None:
-    """Write a finished file, whole or not at all; half of one that a machine left when it stopped goes.
+    """Write a finished file, whole or not at all; half of one that a machine left when it stopped goes, after
+    an hour: before, another copy may be writing it.
 
     Raises
     ------
@@ -505,6 +511,8 @@ def put(content: bytes, target: Path, overwrite: bool, mode: int = 0o644) -> Non
     refuse_existing(target, overwrite)
     target.parent.mkdir(parents=True, exist_ok=True)
     for part in target.parent.glob(f".{glob.escape(target.name)}.????????"):
-        if _PART.fullmatch(part.suffix) and part.is_file() and not part.is_symlink():
-            part.unlink(missing_ok=True)
+        with contextlib.suppress(FileNotFoundError):
+            left = time.time() - part.lstat().st_mtime > LEFT_S
+            if left and _PART.fullmatch(part.suffix) and part.is_file() and not part.is_symlink():
+                part.unlink()
     write_atomic(target, content, mode)

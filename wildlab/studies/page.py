@@ -31,6 +31,7 @@ from wildlab.evaluation.shares import (
     MOSTLY_NOT,
     NO_PREMISE,
     UNDECIDABLE,
+    UNDECIDED,
     Check,
     decide_check,
     paired_difference,
@@ -264,6 +265,7 @@ def _share_words(found: Any, check: Check) -> str:
     low, high = (100 * end for end in found.share[1:])
     told = f"{found.true} of {found.met}"
     beyond = f", of {found.flights} flights in all" if found.met < found.flights else ""
+    beyond += ": too few to decide" if found.verdict == UNDECIDED and found.true in (0, found.met) else ""
     return f"{told} ({low:.0f} to {high:.0f} %){beyond}"
 
 

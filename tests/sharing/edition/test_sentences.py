@@ -97,7 +97,11 @@ def test_what_is_told_to_be_wrong_has_advice(what):
     [("look closer", False), ("not judged", False), (None, False), ("worth fixing", True), ("sound", True)],
 )
 def test_only_what_was_judged_is_called_reliable(verdict, trusted):
-    assert tell(WHOLE._replace(verdict=verdict)).trusted == trusted
+    told = WHOLE._replace(verdict=verdict)
+    assert tell(told).trusted == trusted
+    # What is worth fixing elsewhere does not make tracks reliable that are overconfident.
+    assert not tell(told._replace(track_sure=5.0)).trusted
+    assert not tell(told._replace(doubted=("tracking",))).trusted
 
 
 @given(st.floats(0.0, 400.0))

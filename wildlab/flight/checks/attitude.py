@@ -200,7 +200,8 @@ def forces(flight: Flight) -> Iterator[Finding]:
             low, high = abs(by) - 1.96 * sd, abs(by) + 1.96 * sd
             declination = flight.manifest.magnetometer.declination_deg or 0.0
             magnetic = abs(by + declination) < 1.96 * sd + COMPASS_DEG
-            facts |= {"by": by, "low": low, "high": high, "magnetic": magnetic, "declination": declination}
+            # The declination stays out: reports show this, and it tells of a place.
+            facts |= {"by": by, "low": low, "high": high, "magnetic": magnetic}
             causes = ("declination missing",) if magnetic else ("heading off",)
             back = Rotation.from_euler("z", -error.by).as_matrix()
             turn = change_attitude(source, partial(np.matmul, back))
