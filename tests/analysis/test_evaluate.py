@@ -9,6 +9,7 @@ import pytest
 from tests.analysis.conftest import changed, score
 from wildlab.analysis.accuracy import on_one_heading
 from wildlab.analysis.georeference import (
+    covariances_of,
     errors_of,
     observe,
     pose_errors,
@@ -74,3 +75,39 @@ def test_a_line_flown_there_and_back_is_not_one_heading(make_flight):
     assert on_one_heading(there)
     yaw[::2] += np.pi
     assert not on_one_heading(replace(seen, poses=replace(seen.poses, R_nb=euler_to_matrix(0.1, 0.0, yaw))))
+
+
+def noisy_truth(flight, sd):
+    """Marks logged with an error of that size, stated."""
+    off = np.random.default_rng(1).normal(0, sd, (len(flight.truth), 2))
+    truth = flight.truth.assign(sd_horizontal_m=sd)
+    truth[["north_m", "east_m"]] += off
+    return replace(flight, tables={**flight.tables, "truth": truth})
+
+
+def test_the_stated_error_of_the_truth_is_no_fault_of_the_ellipses(make_flight):
+    flight = make_flight(attitude_deg=1.0, position_m=1.0, pixel_px=2.0, n_images=80)
+    exact, noisy = score(flight), score(noisy_truth(flight, 3.0))
+    silent = noisy_truth(flight, 3.0)
+    silent.tables["truth"] = silent.truth.drop(columns="sd_horizontal_m")
+    assert 0.86 < exact["inside_90"].mean() < 0.94
+    assert 0.86 < noisy["inside_90"].mean() < 0.94
+    assert score(silent)["inside_90"].mean() < 0.75
+    # What is drawn is the point's own ellipse.
+    assert np.allclose(covariances_of(noisy), covariances_of(exact))
+    stated_zero = replace(flight, tables={**flight.tables, "truth": flight.truth.assign(sd_horizontal_m=0.0)})
+    pd.testing.assert_frame_equal(score(stated_zero), exact)
+
+
+def test_the_ground_is_the_stated_one_and_the_truth_s_only_where_nothing_else_is_known(make_flight):
+    flight = make_flight()
+    truth = flight.truth.assign(down_m=flight.truth["down_m"] + 7.0)
+    wrong = replace(flight, tables={**flight.tables, "truth": truth})
+    table = score(wrong)
+    assert table["error_m"].max() < 1e-6 and set(table["ground"]) == {"stated"}
+    few = flight.detections.copy()
+    few.loc[:9, "plane_down_m"] = np.nan
+    some = replace(wrong, tables={**wrong.tables, "detections": few})
+    table = score(some)
+    assert list(table["ground"][:11]) == ["truth"] * 10 + ["stated"]
+    assert table["error_m"][:10].min() > 0.01 and table["error_m"][10:].max() < 1e-6

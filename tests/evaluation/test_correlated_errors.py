@@ -6,7 +6,7 @@ from scipy.stats import f
 
 from wildlab.evaluation.correlated_errors import (
     Covariance,
-    KnownPlaces,
+    Places,
     PosePoints,
     WanderNoise,
     degrees_of_freedom,
@@ -48,9 +48,10 @@ def test_it_is_the_dense_covariance(place_sd):
     points = drawn_points(12)
     n, C, B = len(points.time), dense(points, NOISE), np.random.default_rng(1).normal(size=(48, 2, 3))
     expected, determinant = np.linalg.inv(C), np.linalg.slogdet(C)[1]
-    of = np.arange(n) % 7
+    of, places = np.arange(n) % 7, None
     if place_sd is not None:
         Z = np.kron(np.eye(7)[of], np.eye(2))
+        places = Places(of, np.full(n, place_sd), np.full(n, np.nan))
         if np.isfinite(place_sd):
             C = C + place_sd**2 * Z @ Z.T
             expected, determinant = np.linalg.inv(C), np.linalg.slogdet(C)[1]
@@ -58,9 +59,7 @@ def test_it_is_the_dense_covariance(place_sd):
             S = Z.T @ expected @ Z
             determinant += np.linalg.slogdet(S)[1]
             expected = expected - expected @ Z @ np.linalg.solve(S, Z.T @ expected)
-    inner, logarithm = Covariance(
-        points, NOISE, None if place_sd is None else KnownPlaces(of, place_sd)
-    ).weigh(B)
+    inner, logarithm = Covariance(points, NOISE, places).weigh(B)
     columns = B.reshape(2 * n, 3)
     np.testing.assert_allclose(inner, columns.T @ expected @ columns, rtol=1e-9, atol=1e-7)
     assert logarithm == pytest.approx(determinant)
@@ -99,3 +98,28 @@ def test_a_constant_against_errors_that_wander_is_as_certain_as_its_interval_say
         white += float(alone.x[0] ** 2 * alone.information[0, 0]) > 3.84
     assert white > 8
     assert wandering <= 2
+
+
+@pytest.mark.parametrize("every", [3.0, 0.0])
+def test_the_error_of_a_logged_place_wanders_with_that_of_logged_positions(every):
+    """Against the dense covariance; two of three things move, and images may be taken at once."""
+    points = drawn_points(12, every=every)
+    n, C, B = len(points.time), dense(points, NOISE), np.random.default_rng(1).normal(size=(48, 2, 3))
+    of, sd = np.arange(n) % 3, np.array([0.5, 3.0, 1.0])
+    time = np.where(of > 0, points.time, np.nan)
+    apart = np.abs(points.time[:, None] - points.time) * (of > 0)
+    rho = np.exp(-apart / NOISE.lasts[0]) * (of[:, None] == of)
+    C = C + np.kron(rho * np.outer(sd[of], sd[of]), np.eye(2))
+    inner, logarithm = Covariance(points, NOISE, Places(of, sd[of], time)).weigh(B)
+    columns = B.reshape(2 * n, 3)
+    np.testing.assert_allclose(inner, columns.T @ np.linalg.solve(C, columns), rtol=1e-4)
+    assert logarithm == pytest.approx(np.linalg.slogdet(C)[1], abs=1e-3)
+
+
+def test_what_few_knots_leave_of_a_logged_place_is_each_point_s_own(monkeypatch):
+    monkeypatch.setattr("wildlab.evaluation.correlated_errors.KNOTS", 4)
+    time = np.linspace(0.0, 300.0, 31)
+    loadings, white = Places(np.zeros(31, int), np.full(31, 3.0), time).loadings(60.0)
+    assert loadings.shape == (31, 4)
+    np.testing.assert_allclose((loadings**2).sum(axis=1) + white, 9.0, rtol=1e-5)
+    assert white[[0, 10, 20, 30]] == pytest.approx(0.0, abs=1e-4) and white[5] > 3.0

@@ -18,6 +18,7 @@ from wildlab.analysis.georeference import (
     blocks_of,
     calibrated,
     covariances_of,
+    error_covariances,
     errors_of,
     georeference,
     observe,
@@ -180,7 +181,7 @@ def judge_accuracy(
         intervals=intervals,
         lost=int((~np.isfinite(scored["error_m"])).sum()),
         assumed=used_deviations(observations, deviations),
-        ellipses=judge_ellipses(errors, covariances_of(scored), blocks, rng),
+        ellipses=judge_ellipses(errors, error_covariances(scored), blocks, rng),
         axes=split_along(errors, axes_of(observations, scored), blocks),
         halves=compare_halves(scored["error_m"].to_numpy(float), blocks),
         diagnosis=diagnosis,
@@ -268,6 +269,7 @@ def compare_sightings(points: pd.DataFrame) -> pd.DataFrame:
     DataFrame
         The points that name a thing, with ``truth_id`` (its name), ``error_north_m``, ``error_east_m`` and
         ``error_m``, as from `wildlab.analysis.georeference.score_points`; NaN where no other image shows it.
+        ``truth_sd_m`` is zero: nothing is held against a truth.
     """
     named = points[points["target_id"].astype(str) != ""].reset_index(drop=True)
     xy, things = named[["north_m", "east_m"]].to_numpy(float), named["target_id"].to_numpy(str)
@@ -276,8 +278,9 @@ def compare_sightings(points: pd.DataFrame) -> pd.DataFrame:
         own = images == image
         error[own] = (xy - mean_of_others(xy, things, ~own))[own]
     return named.assign(
-        truth_id=things, error_north_m=error[:, 0], error_east_m=error[:, 1], error_m=np.hypot(*error.T)
-    )
+        truth_id=things, truth_sd_m=0.0,
+        error_north_m=error[:, 0], error_east_m=error[:, 1], error_m=np.hypot(*error.T),
+    )  # fmt: skip
 
 
 def judge_repeats(observations: Observations, rng: np.random.Generator) -> Repeats:

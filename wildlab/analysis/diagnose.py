@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from wildlab.analysis.georeference import (
     Observations,
     blocks_of,
-    covariances_of,
+    error_covariances,
     known_points,
     pose_errors,
     shifting_poses,
@@ -46,8 +46,8 @@ from wildlab.evaluation.correlated_errors import (
     LASTS_IMAGES,
     LASTS_S,
     Covariance,
-    KnownPlaces,
     LinearFit,
+    Places,
     PosePoints,
     WanderNoise,
     degrees_of_freedom,
@@ -58,7 +58,6 @@ from wildlab.evaluation.errors import ErrorSummary, summarise
 from wildlab.evaluation.intervals import Labels
 from wildlab.evaluation.outliers import Outlier, find_outliers
 from wildlab.evaluation.pose_noise import KINDS
-from wildlab.flight.store import Flight
 from wildlab.geometry.calibration import (
     BORESIGHT,
     BOUNDS,
@@ -417,9 +416,7 @@ class _Search:
         self.scored, self.chosen, self.known, self.places_known = scored, chosen, known, places_known
         self.names_of = scored["truth_id"].to_numpy(str)
         self.things = None if places_known else self.names_of
-        sd = _survey_error(flight, self.names_of) if places_known else np.inf
-        self.places = KnownPlaces(self.names_of, sd) if sd > 0 else None
-        self.blocks, self.ellipses = blocks_of(flight, scored), covariances_of(scored)
+        self.blocks, self.ellipses = blocks_of(flight, scored), error_covariances(scored)
         self.poses_at = _poses(chosen, self.names_of)
         timed = flight.manifest.time.kind == "utc" and "frame_id" not in flight.nav[chosen.source]
         self.causes = [cause for cause in CAUSES if timed or cause != "clock"]
@@ -427,14 +424,19 @@ class _Search:
             self.causes.remove("position")  # moves all sightings alike
         seconds = flight.manifest.time.kind == "utc" and bool(np.isfinite(scored["time_s"]).all())
         frames = pd.Index(flight.table("frames")["frame_id"]).get_indexer(pd.Index(scored["frame_id"]))
-        order = scored["time_s"].to_numpy(float) if seconds else frames.astype(float)
+        self.order = scored["time_s"].to_numpy(float) if seconds else frames.astype(float)
         self.lasts = LASTS_S if seconds else LASTS_IMAGES
-        self.order = order
-        self.assumed = _pose_points(chosen, order)[1]
+        sd, when = np.full(len(scored), np.inf), np.full(len(scored), np.nan)
+        if places_known:
+            sd, truth = scored["truth_sd_m"].to_numpy(float), flight.table("truth")
+            logged = np.isin(self.names_of, truth.loc[truth["time_s"].notna(), "target_id"].astype(str))
+            when[logged] = self.order[logged]
+        self.places = Places(self.names_of, sd, when) if sd.any() else None
+        self.assumed = _pose_points(chosen, self.order)[1]
         self.logged = self.place((), np.zeros(0))
         self.cut = _cut(chosen)
         self._robust: tuple[Mask, Fit] | None = None
-        images = np.unique(order, return_inverse=True)[1]
+        images = np.unique(self.order, return_inverse=True)[1]
         self.groups = self.blocks
         if not places_known:
             self.groups = images * min(MOST_FOLDS, int(images.max()) + 1) // (int(images.max()) + 1)
@@ -634,15 +636,6 @@ def _cut(chosen: Observations) -> Mask:
     if "touches_border" not in table:
         return np.zeros(len(names), bool)
     return table.set_index("detection_id").loc[names, "touches_border"].to_numpy(float) > 0
-
-
-def _survey_error(flight: Flight, names: NDArray[np.str_]) -> float:
-    """Standard deviation of the known places along either axis, m, as stated; zero where it is not."""
-    truth = flight.truth
-    if truth is None or "sd_horizontal_m" not in truth:
-        return 0.0
-    stated = truth.loc[truth["target_id"].isin(set(names)), "sd_horizontal_m"].to_numpy(float)
-    return float(np.nan_to_num(np.sqrt(np.nanmean(stated**2)))) if np.isfinite(stated).any() else 0.0
 
 
 def _scaled(fit: Fit | None) -> tuple[tuple[str, ...], Array]:

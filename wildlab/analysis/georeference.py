@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 
 from wildlab.analysis import Fact, fact
 from wildlab.errors import WildlabError
@@ -50,7 +51,8 @@ class Observations:
     flight, source
         Whose they are, and the name of the ``nav`` table that the poses come from.
     table
-        ``detection_id``, ``frame_id``, ``group``, ``target_id``, ``time_s`` (flight time).
+        ``detection_id``, ``frame_id``, ``group``, ``target_id``, ``time_s`` (flight time), and ``ground``:
+        whose height that has, ``terrain``, ``stated`` or ``truth``; "" where it is not known.
     uv
         (N, 2) pixels.
     poses
@@ -91,8 +93,8 @@ def observe(
 ) -> Observations:
     """Collect the pixel detections of a flight with the poses of one navigation source.
 
-    The ground of a detection is the flight's terrain; without one, the height of the target it names, else
-    the detection's own ``plane_down_m``.
+    The ground of a detection is the flight's terrain; without one, the detection's own ``plane_down_m``. Only
+    where neither is known is it the height of the target it names: the truth then has a part in the answer.
 
     Parameters
     ----------
@@ -153,16 +155,16 @@ def observe(
             "time_s": np.where(at < 0, np.nan, times),
         }
     )
-    seen = Observations(
-        flight,
-        name,
-        table,
-        pixels[["u_px", "v_px"]].to_numpy(float),
-        camera_poses(flight, name, times, at),
-        _ground_heights(flight, table, pixels),
-        flight.terrain,
-    )
-    return _grounded(seen)
+    down = truth_of(flight, table)[:, 2]
+    table["ground"] = np.where(np.isnan(down), "", "truth")
+    if "plane_down_m" in pixels:
+        stated = pixels["plane_down_m"].notna().to_numpy()
+        down[stated] = pixels.loc[stated, "plane_down_m"]
+        table.loc[stated, "ground"] = "stated"
+    if flight.terrain is not None:
+        table["ground"] = "terrain"
+    uv, poses = pixels[["u_px", "v_px"]].to_numpy(float), camera_poses(flight, name, times, at)
+    return _grounded(Observations(flight, name, table, uv, poses, down, flight.terrain))
 
 
 def camera_poses(flight: Flight, source: str, times: Array, rows: Indices) -> CameraPoses:
@@ -359,11 +361,16 @@ def truth_of(flight: Flight, table: pd.DataFrame) -> Array:
     return np.where((at >= 0)[:, None], where[at, np.arange(len(at))], np.nan)
 
 
-def _ground_heights(flight: Flight, table: pd.DataFrame, pixels: pd.DataFrame) -> Array:
-    of_target = truth_of(flight, table)[:, 2]
-    if "plane_down_m" not in pixels:
-        return of_target
-    return np.where(np.isnan(of_target), pixels["plane_down_m"].to_numpy(float), of_target)
+def truth_deviations(flight: Flight, names: ArrayLike) -> Array:
+    """Standard deviations (N,), m, of each axis of the true places of targets (N,), by name.
+
+    The median of what the truth states of a target, as for its tracks; zero where it states nothing.
+    """
+    truth = flight.table("truth")
+    if "sd_horizontal_m" not in truth:
+        return np.zeros(np.shape(names))
+    stated = truth.groupby("target_id")["sd_horizontal_m"].median()
+    return stated.reindex(np.asarray(names, str)).fillna(0.0).to_numpy(float)
 
 
 def ground_facts(observations: Observations, points: pd.DataFrame) -> list[Fact]:
@@ -381,7 +388,9 @@ def ground_facts(observations: Observations, points: pd.DataFrame) -> list[Fact]
     """
     placed, of = int(points["north_m"].notna().sum()), len(points)
     if observations.terrain is None:
-        return [fact("ground-level", placed=placed, of=of)]
+        whose = points.loc[points["north_m"].notna(), "ground"].value_counts()
+        heights = {name: int(whose.get(name, 0)) for name in ("stated", "truth")}
+        return [fact("ground-level", placed=placed, of=of, **heights)]
     became = "; ".join(f"{n} {words}" for words, n in points["ray"].value_counts().items())
     return [fact("ground-terrain", of=of, became=became or "none")]
 
@@ -496,7 +505,7 @@ def _described(flight: Flight, points: pd.DataFrame, vertical: str, source: str)
 #: What goes along with a point into a map.
 PROPERTIES = (
     "detection_id", "frame_id", "target_id", "time_s", "long_90_m", "short_90_m", "bearing_deg", "level",
-    "ellipse", "method", "vertical_reference", "source", "flight",
+    "ground", "ellipse", "method", "vertical_reference", "source", "flight",
 )  # fmt: skip
 
 
@@ -534,8 +543,8 @@ def score_points(flight: Flight, points: pd.DataFrame) -> pd.DataFrame:
     -------
     DataFrame
         The points that can be judged, with ``truth_id``, ``error_north_m``, ``error_east_m``, ``error_m``
-        (NaN where the ray missed the ground) and ``inside_90`` (whether the truth lies in the 90 % ellipse;
-        NaN where there is no ellipse).
+        (NaN where the ray missed the ground), ``truth_sd_m`` (see `truth_deviations`) and ``inside_90``
+        (whether the truth lies in the 90 % ellipse, widened by its own error; NaN where there is no ellipse).
 
     Raises
     ------
@@ -570,18 +579,22 @@ def score_points(flight: Flight, points: pd.DataFrame) -> pd.DataFrame:
             field="detections.target_id",
         )
     error = (xy - where[:, :2])[known]
-    scored = points.iloc[np.flatnonzero(known)]
-    covariance = covariances_of(scored)
-    inside = inside_ellipse(error, covariance).astype(float)
-    inside[~np.isfinite(covariance).all(axis=(1, 2))] = np.nan
-    scored = scored.assign(
+    scored = points[known].assign(
         truth_id=names[known],
+        truth_sd_m=truth_deviations(flight, names[known]),
         error_north_m=error[:, 0],
         error_east_m=error[:, 1],
         error_m=np.hypot(*error.T),
-        inside_90=inside,
     )
-    return scored.reset_index(drop=True)
+    covariance = error_covariances(scored)
+    inside = inside_ellipse(error, covariance).astype(float)
+    inside[~np.isfinite(covariance).all(axis=(1, 2))] = np.nan
+    return scored.assign(inside_90=inside).reset_index(drop=True)
+
+
+def error_covariances(scored: pd.DataFrame) -> Array:
+    """The covariances (N, 2, 2) m^2 of the errors of a scored table: of its points and of the truth."""
+    return covariances_of(scored) + scored["truth_sd_m"].to_numpy(float)[:, None, None] ** 2 * np.eye(2)
 
 
 def errors_of(scored: pd.DataFrame) -> Array:

@@ -93,10 +93,10 @@ def compare(flights: tuple[Path, ...], out: Path | None, reports: Path) -> None:
 def georeference(flight: Path, out: Path, overwrite: bool, source: str | None, seed: int) -> None:
     """Put the pixel detections of FLIGHT on the ground.
 
-    Each has its 90 % ellipse, on its terrain where it has one, else on a level plane at the height of each
-    target. A CSV holds metres north and east of the flight's origin and no coordinates; a GeoJSON
-    holds the places themselves, so send it to nobody who may not know them. It has the ellipses as polygons,
-    and opens in QGIS as it is.
+    Each has its 90 % ellipse, on its terrain where it has one, else on a level plane at the height that it
+    states, or that of the target. A CSV holds metres north and east of the flight's origin and no
+    coordinates; a GeoJSON holds the places themselves, so send it to nobody who may not know them. It has the
+    ellipses as polygons, and opens in QGIS as it is.
 
     \b
     Examples:

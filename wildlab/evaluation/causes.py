@@ -19,7 +19,7 @@ from scipy.special import fdtrc
 
 from wildlab.evaluation.correlated_errors import (
     Covariance,
-    KnownPlaces,
+    Places,
     PosePoints,
     WanderNoise,
     fit_generalised,
@@ -76,7 +76,7 @@ class Fold(NamedTuple):
 
 
 def leave_out(
-    groups: Labels, used: Mask, points: PosePoints, noise: WanderNoise, places: KnownPlaces | None = None
+    groups: Labels, used: Mask, points: PosePoints, noise: WanderNoise, places: Places | None = None
 ) -> list[Fold]:
     """Each group of points left out in turn.
 

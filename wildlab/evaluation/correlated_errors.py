@@ -32,6 +32,8 @@ PRIOR_SHARE = 1.5
 #: Time constants of positions, tilts and headings about which their priors lie, s: minutes for a satellite
 #: fix, tens of seconds for an attitude (H 5.6). Where images have no times, images.
 LASTS_S, LASTS_IMAGES = (60.0, 20.0, 20.0), (10.0, 3.0, 3.0)
+#: Values at most by which errors of all logged places together are known.
+KNOTS = 100
 #: Which of them each of the six pose errors has.
 _LASTS = [0, 0, 0, 1, 1, 2]
 
@@ -59,7 +61,7 @@ class PosePoints(NamedTuple):
         return PosePoints(*(values[rows] for values in self))
 
 
-class KnownPlaces(NamedTuple):
+class Places(NamedTuple):
     """What N points are of, and how well it is known where that is.
 
     Attributes
@@ -67,15 +69,41 @@ class KnownPlaces(NamedTuple):
     of
         (N,) names.
     sd
-        Standard deviation of a place along either axis, m; infinite where places are not known.
+        (N,) standard deviation of the place along either axis, m; infinite where nothing is known of it.
+    time
+        (N,) s, where the place is from a receiver's log: its error then wanders as that of logged positions
+        does, with the same time constant. NaN where it is off by the same all the time.
     """
 
     of: NDArray[np.generic]
-    sd: float
+    sd: Array
+    time: Array
 
-    def take(self, rows: NDArray[np.bool_]) -> KnownPlaces:
+    def take(self, rows: NDArray[np.bool_]) -> Places:
         """Of some of the points."""
-        return self._replace(of=self.of[rows])
+        return Places(self.of[rows], self.sd[rows], self.time[rows])
+
+    def loadings(self, lasts: float) -> tuple[Array, Array]:
+        """(N, K) of independent errors of unit variance, and the variance (N,) that they leave to each point.
+
+        Where there are many times a process is known by its values at some, evenly in time; what they leave
+        is each point's own (fully independent training conditional: Snelson and Ghahramani 2006).
+        """
+        sd, wanders = np.where(np.isfinite(self.sd), self.sd, 1.0), np.isfinite(self.time)
+        moving, white = np.unique(self.of[wanders]), np.zeros(len(sd))
+        columns = [sd[:, None] * (self.of[:, None] == np.unique(self.of[~wanders]))]
+        for name in moving:
+            own, most = self.of == name, max(2, KNOTS // len(moving))
+            knots = np.unique(self.time[own])
+            if len(knots) > most:
+                knots = np.linspace(knots[0], knots[-1], most)
+            between, onto = (np.exp(-np.abs(at[:, None] - knots) / lasts) for at in (knots, self.time[own]))
+            # Images that were taken at once have the same error, which has no inverse.
+            factor = np.linalg.cholesky(between + 1e-9 * np.eye(len(knots)))
+            columns.append(np.zeros((len(sd), len(knots))))
+            columns[-1][own] = sd[own, None] * solve_triangular(factor, onto.T, lower=True).T
+            white[own] = np.maximum(sd[own] ** 2 - (columns[-1][own] ** 2).sum(axis=1), 0.0)
+        return np.hstack(columns), white
 
 
 class WanderNoise(NamedTuple):
@@ -144,16 +172,22 @@ class Covariance:
     [[0.5]]
     """
 
-    def __init__(self, points: PosePoints, noise: WanderNoise, places: KnownPlaces | None = None) -> None:
+    def __init__(self, points: PosePoints, noise: WanderNoise, places: Places | None = None) -> None:
         when, image = np.unique(points.time, return_inverse=True)
         self._order = np.argsort(image, kind="stable")
         self._image = image[self._order]
         sd = np.array([noise.sd[kind] for kind, axes in KINDS.items() for _ in axes])
         self._G = points.derivatives[self._order] * sd
-        self._own = (points.own + noise.sd["pixel"] ** 2 * points.pixel)[self._order]
+        own = points.own + noise.sd["pixel"] ** 2 * points.pixel
+        self._places = None
+        if places is not None:
+            loadings, white = places.loadings(noise.lasts[0])
+            own = own + white[:, None, None] * np.eye(2)
+            prior = np.isfinite(places.sd).all() * np.eye(2 * loadings.shape[1])
+            self._places = np.kron(loadings, np.eye(2)).reshape(len(own), 2, -1), prior
+        self._own = own[self._order]
         self._rho = np.minimum(np.exp(-np.diff(when)[:, None] / np.take(noise.lasts, _LASTS)), 1 - 1e-6)
         self._share = noise.share
-        self._places = None if places is None else (np.unique(places.of, return_inverse=True)[1], places.sd)
 
     def weigh(self, B: Array) -> tuple[Array, float]:
         """Products of the columns of B by the inverse covariance; its logarithmic determinant.
@@ -169,15 +203,10 @@ class Covariance:
         """
         if self._places is None:
             return self._weigh(B)
-        of, sd = self._places
-        Z = np.zeros((len(of), 2, int(of.max()) + 1, 2))
-        Z[np.arange(len(of)), 0, of, 0] = Z[np.arange(len(of)), 1, of, 1] = 1.0
-        inner, logarithm = self._weigh(np.concatenate([Z.reshape(len(of), 2, -1), B], axis=-1))
-        n = len(inner) - B.shape[-1]
-        information, across = inner[:n, :n], inner[:n, n:]
-        if np.isfinite(sd):
-            information += np.eye(n) / sd**2
-            logarithm += 2 * n * float(np.log(sd))
+        Z, prior = self._places
+        inner, logarithm = self._weigh(np.concatenate([Z, B], axis=-1))
+        n = len(prior)
+        information, across = inner[:n, :n] + prior, inner[:n, n:]
         factor = np.linalg.cholesky(information)
         explained = solve_triangular(factor, across, lower=True)
         logarithm += float(2 * np.log(np.diagonal(factor)).sum())
@@ -238,7 +267,7 @@ def estimate_wander(
     J: ArrayLike,
     assumed: dict[str, float],
     lasts: tuple[float, float, float] = LASTS_S,
-    places: KnownPlaces | None = None,
+    places: Places | None = None,
 ) -> WanderFit:
     """Most likely noise behind residuals, whatever constants are behind them too.
 
@@ -286,7 +315,7 @@ def estimate_wander(
 
 
 def degrees_of_freedom(
-    J: Array, x: Array, points: PosePoints, found: WanderFit, places: KnownPlaces | None = None
+    J: Array, x: Array, points: PosePoints, found: WanderFit, places: Places | None = None
 ) -> float:
     """Degrees of freedom of a test of constants, for the noise is only estimated (Satterthwaite 1946).
 

@@ -10,7 +10,13 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.analysis.accuracy import observe_calibrated
-from wildlab.analysis.georeference import covariances_of, georeference, score_points
+from wildlab.analysis.georeference import (
+    covariances_of,
+    error_covariances,
+    errors_of,
+    georeference,
+    score_points,
+)
 from wildlab.analysis.overview import POSITION, cover_images, ground_height, ordered
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import position_nees
@@ -418,11 +424,12 @@ def _points(flight: Flight, source: str | None, lacks: list[str]) -> Points | No
     if not len(table):
         return None
     P = covariances_of(table)
-    error = np.full((len(table), 2), np.nan)
+    error, of_error = np.full((len(table), 2), np.nan), P.copy()
     if flight.truth is not None:
         try:
             scored = score_points(flight, table.assign(row=np.arange(len(table))))
-            error[scored["row"].to_numpy(int)] = scored[["error_north_m", "error_east_m"]].to_numpy(float)
+            rows = scored["row"].to_numpy(int)
+            error[rows], of_error[rows] = errors_of(scored), error_covariances(scored)
         except WildlabError as refusal:
             lacks.append(f"errors of the detections: {refusal.problem}")
     return Points(
@@ -431,7 +438,7 @@ def _points(flight: Flight, source: str | None, lacks: list[str]) -> Points | No
         P,
         table["target_id"].astype(str).to_numpy(object),
         np.hypot(*error.T),
-        position_nees(error, P),
+        position_nees(error, of_error),
     )
 
 

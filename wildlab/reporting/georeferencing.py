@@ -151,8 +151,7 @@ def named(tables: Mapping[str, pd.DataFrame], kind: str, *, shown: bool) -> dict
 
 
 def truth_errors(flight: Flight, scored: pd.DataFrame) -> dict[str, float]:
-    """Reported SD (m, or NaN) of the "track" and "mark" that points are compared with, of those there are;
-    a simulated flight's truth is exact.
+    """Reported SD (m, or NaN) of the "track" and "mark" that points are compared with, of those there are.
 
     Parameters
     ----------
@@ -161,8 +160,6 @@ def truth_errors(flight: Flight, scored: pd.DataFrame) -> dict[str, float]:
     scored
         From `wildlab.analysis.georeference.score_points`, of it.
     """
-    if flight.manifest.kind == "twin":
-        return {}
     truth, used = flight.table("truth"), set(scored["truth_id"].astype(str))
     moving = set(truth.loc[truth["time_s"].notna(), "target_id"])
     sd = truth.get("sd_horizontal_m", pd.Series(np.nan, truth.index)).astype(float)
@@ -343,12 +340,14 @@ def limits(
     manifest, diagnosis = flight.manifest, found.diagnosis
     offset = manifest.clocks.camera_offset_s
     rest = offset - ZONE_S * round(offset / ZONE_S)
+    by_truth = int((found.points["ground"] == "truth").sum())
     timed = manifest.time.kind == "utc" and "frame_id" not in flight.pose_source(source)[1]
     conditional: tuple[tuple[str, bool, dict[str, Any]], ...] = (
         ("limit-heading", one_heading_hides(found), {}),
         ("limit-misfit", diagnosis is not None and diagnosis.misfit, {}),
         ("limit-extended", diagnosis is not None and diagnosis.extended, {}),
         ("limit-lost", 0 < found.lost <= MANY_LOST * len(found.scored), {"lost": found.lost}),
+        ("limit-truth-height", by_truth > 0, {"points": by_truth}),
         ("limit-clock-fitted", manifest.kind != "twin" and abs(rest) > 1e-6, {"offset": f"{rest:+.2f}"}),
         ("limit-halves", bool(found.halves.disagree), {}),
         ("limit-nearest", found.visible_m == found.visible_m, {"hidden": short_length(found.visible_m)}),
@@ -515,7 +514,9 @@ def _subtitle(flight: Flight, found: Accuracy) -> str:
         poses = found.observations.poses
         height = (found.observations.plane_down - poses.p_nb[:, 2])[placed]
         depression = np.degrees(np.arcsin(np.clip(poses.R_nc[placed, 2, 2], -1, 1)))
-        views = f"{span(height)} m above the ground, camera {span(depression)}° below the horizon, "
+        names = load_texts("georeferencing").subjects
+        ground = listed([names[f"ground-{one}"] for one in found.points.loc[placed, "ground"].unique()])
+        views = f"{span(height)} m above {ground}, camera {span(depression)}° below the horizon, "
     rule = (
         "its known position" if flight.manifest.scoring.rule == "labelled" else "the nearest known position"
     )
