@@ -166,12 +166,8 @@ def judge_accuracy(
             low, high = bootstrap_interval(figure, errors, blocks, rng)
             intervals[name] = max(low, 0.0), high
     left, of = errors, scored
-    if diagnosis is not None and diagnosis.counts:
-        left, of = diagnosis.winner.held, diagnosis.scored
-    elif diagnosis is not None:
-        left, of = errors_of(diagnosis.scored), diagnosis.scored
     if diagnosis is not None:
-        left, of = left[diagnosis.inliers], of[diagnosis.inliers]
+        left, of = diagnosis.shown.held[diagnosis.inliers], diagnosis.scored[diagnosis.inliers]
     by_nearest = flight.manifest.scoring.rule == "nearest"
     return Accuracy(
         observations=observations,

@@ -59,19 +59,17 @@ from wildlab.evaluation.errors import ErrorSummary, summarise
 from wildlab.evaluation.intervals import Labels
 from wildlab.evaluation.outliers import Outlier, find_outliers
 from wildlab.evaluation.pose_noise import KINDS
-from wildlab.geometry.calibration import (
+from wildlab.geometry.calibration import Fit, fit_points, undetermined_parameter
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.corrections import (
     BORESIGHT,
     BOUNDS,
     PARAMETERS,
     Calibration,
-    Fit,
     calibrated_poses,
     calibration_jacobian,
-    fit_points,
     georeference_calibrated,
-    undetermined_parameter,
 )
-from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.covariances import chi2_quantile
 from wildlab.geometry.frames import Array, Mask
 from wildlab.geometry.robust import student_scale

@@ -21,8 +21,8 @@ from wildlab.files import write_atomic, write_csv
 from wildlab.flight.clocks import between, frame_times, gimbal_angles, pose_finder, poses_at, truth_at
 from wildlab.flight.store import Flight
 from wildlab.geometry.attitude_uncertainty import pose_covariance
-from wildlab.geometry.calibration import Calibration, PosesAt, calibrated_poses
 from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.corrections import Calibration, PosesAt, calibrated_poses
 from wildlab.geometry.covariances import ellipse_axes, inside_ellipse
 from wildlab.geometry.frames import Array, Indices, Mask, ned_to_geodetic
 from wildlab.geometry.georeference import RAY_STATUS, georeference_pixels

@@ -35,22 +35,11 @@ if TYPE_CHECKING:
         tilt_from_roll_pitch,
     )
     from wildlab.geometry.calibration import (
-        BORESIGHT,
-        BOUNDS,
-        PARAMETERS,
-        Calibration,
         Fit,
         Mounting,
-        PosesAt,
-        apply_calibration,
         calibrate,
-        calibrated_camera,
-        calibrated_poses,
-        calibration_jacobian,
         fit_points,
-        georeference_calibrated,
         mounting_from_points,
-        split_images,
         undetermined_parameter,
         with_covariance,
     )
@@ -68,6 +57,18 @@ if TYPE_CHECKING:
         undistort_approximately,
     )
     from wildlab.geometry.camera_poses import CameraPoses
+    from wildlab.geometry.corrections import (
+        BORESIGHT,
+        BOUNDS,
+        PARAMETERS,
+        Calibration,
+        PosesAt,
+        apply_calibration,
+        calibrated_camera,
+        calibrated_poses,
+        calibration_jacobian,
+        georeference_calibrated,
+    )
     from wildlab.geometry.covariances import ellipse_axes, inside_ellipse
     from wildlab.geometry.flodell import geodetic_to_enu_linear, linear_enu_error, metres_per_degree
     from wildlab.geometry.flow import (
@@ -152,11 +153,9 @@ if TYPE_CHECKING:
         mount_rotation,
     )
     from wildlab.geometry.robust import (
-        RobustFit,
         fit_linear,
         student_cost,
         student_scale,
-        student_weights,
     )
     from wildlab.geometry.terrain import (
         Met,
@@ -219,7 +218,6 @@ __all__ = [
     "Origin",
     "PoseErrors",
     "PosesAt",
-    "RobustFit",
     "Terrain",
     "Twist",
     "Velocity",
@@ -305,10 +303,8 @@ __all__ = [
     "sample_rays",
     "sample_terrain",
     "skew",
-    "split_images",
     "student_cost",
     "student_scale",
-    "student_weights",
     "target_velocity",
     "terrain_covariance",
     "terrain_jacobians",

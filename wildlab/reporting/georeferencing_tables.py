@@ -14,7 +14,7 @@ from wildlab.evaluation.correlated_errors import WanderNoise
 from wildlab.evaluation.errors import AlongAxis, ErrorSummary, summarise
 from wildlab.evaluation.outliers import Outlier
 from wildlab.flight.store import Flight
-from wildlab.geometry.calibration import BORESIGHT, Calibration
+from wildlab.geometry.corrections import BORESIGHT, Calibration
 from wildlab.messages.catalogue import load_texts
 from wildlab.messages.quantities import length
 from wildlab.reporting.report import Report
