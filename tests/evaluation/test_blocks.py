@@ -7,7 +7,6 @@ from scipy.stats import norm, t
 
 from wildlab.evaluation.intervals import (
     block_mean,
-    compare_halves,
     independent_blocks,
     time_blocks,
     widening,
@@ -56,16 +55,6 @@ def test_intervals_hold_what_they_say_where_errors_outlast_a_block(seconds, last
     assert 0.84 < np.mean([one.low <= 0 <= one.high for one in found]) < 0.96
     ratio = np.median([independent_blocks(one, blocks) for one in errors]) / (blocks.max() + 1)
     assert ratio > 0.7 if lasts < 1 else ratio < 0.4
-
-
-@pytest.mark.parametrize(("step", "disagree"), [(0.0, False), (2.0, True)])
-def test_halves_that_disagree_are_found(step, disagree):
-    rng = np.random.default_rng(3)
-    blocks = np.repeat(np.arange(12), 5)
-    values = rng.normal(3.0, 0.5, 60) + step * (blocks >= 6)
-    halves = compare_halves(values, blocks)
-    assert halves.disagree is disagree
-    assert halves.difference.estimate == pytest.approx(halves.second - halves.first)
 
 
 def test_an_interval_of_many_blocks_is_widened_to_those_that_count():

@@ -40,7 +40,7 @@ def test_a_truth_s_own_error_is_that_of_what_points_are_compared_with():
     assert reported == {"mark": 0.02, "track": pytest.approx(1.5)}
 
 
-def limits_with(offset=0.0, kind="logged", truth=MappingProxyType({}), certain=False, halves=False, lost=0):
+def limits_with(offset=0.0, kind="logged", truth=MappingProxyType({}), certain=False, lost=0):
     manifest = SimpleNamespace(
         kind=kind, clocks=SimpleNamespace(camera_offset_s=offset), time=SimpleNamespace(kind="utc"),
         vertical=SimpleNamespace(correction_m=0.0),
@@ -52,7 +52,7 @@ def limits_with(offset=0.0, kind="logged", truth=MappingProxyType({}), certain=F
             counts=certain, winner=winner, inseparable=(), extended=False, misfit=False
         ),
         visible_m=np.nan, points=pd.DataFrame({"ground": ["stated"]}),
-        lost=lost, scored=range(100), halves=SimpleNamespace(disagree=halves),
+        lost=lost, scored=range(100),
     )  # fmt: skip
     return {one.key: dict(one.values) for one in georeferencing.limits(flight, found, truth, [], None)}
 

@@ -44,7 +44,6 @@ from wildlab.evaluation.errors import (
     split_along,
     summarise,
 )
-from wildlab.evaluation.intervals import Halves, compare_halves
 from wildlab.evaluation.outliers import largest_visible
 from wildlab.flight.calibration_files import (
     UNITS,
@@ -90,8 +89,8 @@ class Accuracy:
         The standard deviations that the ellipses come from.
     ellipses
         What they are worth.
-    axes, halves
-        Errors along axes, and first half beside second.
+    axes
+        Errors along axes.
     diagnosis
         The cause, where six images or more show a known point.
     remaining
@@ -110,7 +109,6 @@ class Accuracy:
     assumed: dict[str, float]
     ellipses: EllipseVerdict
     axes: dict[str, AlongAxis]
-    halves: Halves
     diagnosis: Diagnosis | None
     remaining: Scatter
     visible_m: float
@@ -133,7 +131,7 @@ def judge_accuracy(
     observations
         From `observe` of a flight with truth, with a calibration applied or not.
     rng
-        Draws halves, blocks, and samples of flat rays.
+        Draws blocks, and samples of flat rays.
     deviations
         Standard deviations in place of those that log and manifest state.
 
@@ -179,7 +177,6 @@ def judge_accuracy(
         assumed=used_deviations(observations, deviations),
         ellipses=judge_ellipses(errors, error_covariances(scored), blocks, rng),
         axes=split_along(errors, axes_of(observations, scored), blocks),
-        halves=compare_halves(scored["error_m"].to_numpy(float), blocks),
         diagnosis=diagnosis,
         remaining=scatter_by_image(left, of["frame_id"]),
         visible_m=visible_error(flight, scored) if by_nearest else np.nan,

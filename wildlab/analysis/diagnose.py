@@ -464,7 +464,7 @@ class _Search:
 
     def far_out(self, fit: Fit) -> tuple[tuple[Outlier, ...], Mask]:
         """What is far out with a fit taken off, and which points (N,) are not."""
-        off, logged = (self._about_things(self.place(*_scaled(one))) for one in (fit, None))
+        off, logged = map(self._about_things, (self.place(*_scaled(fit)), self.logged))
         # A ray that a correction tips over the horizon is out in any case.
         off = np.where(np.isfinite(off), off, np.where(np.isfinite(logged), logged, 0.0))
         whitened = np.einsum("nij,nj->ni", np.linalg.inv(np.linalg.cholesky(self.ellipses)), off)
@@ -482,10 +482,6 @@ class _Search:
         """Search for the cause of the errors of the inliers (N,)."""
         robust = self.fit_robustly(inliers)
         used = inliers & robust.usable & np.isfinite(self.logged).all(axis=1)
-        if not self.places_known:
-            # A thing that is left with one sighting says nothing.
-            count = pd.Series(used).groupby(self.names_of).transform("sum").to_numpy()
-            used &= count > 1
         squared = (robust.r**2).sum(axis=1)
         # Of normal errors one in a hundred counts for less (Huber): weights of all would make noise small.
         weights = np.ones(len(used))
@@ -498,17 +494,12 @@ class _Search:
         corrected = replace(
             self.chosen, poses=calibrated_poses(Calibration.in_sizes(names, start), self.poses_at)
         )
-        points = _pose_points(corrected, self.order)[0].take(used)
-        # A ray that this tips over the horizon has the derivatives that it was logged with.
-        over = ~np.isfinite(points.derivatives).all(axis=(1, 2))
-        if over.any():
-            logged = _pose_points(self.chosen, self.order)[0].take(used)
-            points = PosePoints(
-                *(
-                    np.where(over.reshape(-1, *[1] * (a.ndim - 1)), b, a)
-                    for a, b in zip(points, logged, strict=True)
-                )
-            )
+        points = _pose_points(corrected, self.order)[0]
+        # A ray that this tips over the horizon says nothing, nor does a thing that is left with one sighting.
+        used &= np.isfinite(points.derivatives).all(axis=(1, 2))
+        if not self.places_known:
+            used &= pd.Series(used).groupby(self.names_of).transform("sum").to_numpy() > 1
+        points = points.take(used)
         points = points._replace(
             own=points.own / weights[used, None, None], pixel=points.pixel / weights[used, None, None]
         )
@@ -646,10 +637,8 @@ def _cut(chosen: Observations) -> Mask:
     return table.set_index("detection_id").loc[names, "touches_border"].to_numpy(float) > 0
 
 
-def _scaled(fit: Fit | None) -> tuple[tuple[str, ...], Array]:
-    """Names and values in their usual sizes; nothing for the poses as logged."""
-    if fit is None:
-        return (), np.zeros(0)
+def _scaled(fit: Fit) -> tuple[tuple[str, ...], Array]:
+    """Names and values in their usual sizes."""
     return fit.names, fit.values / np.array([PARAMETERS[name] for name in fit.names])
 
 

@@ -12,7 +12,7 @@ Floating Objects using UAVs with Optical Sensors, doctoral thesis, NTNU 2019.
 - `estimate_position_noise`: how rough is the truth itself?
 - `mean_interval`, `mean_share_interval`, `share_interval`: what do so many independent runs say?
 - `summarise`, `scatter_by_image`, `bootstrap_interval`: single positions, and why they err;
-  `time_blocks`, `block_mean`, `compare_halves`: in blocks in time order.
+  `time_blocks`, `block_mean`: in blocks in time order.
 - `held_out`, `gain_of`, `rank_models`: which constant error is behind them, `estimate_wander`: against noise
   that is correlated in time; `split_along`; `find_outliers`.
 - `judge_ellipses`, `spread_of_sightings`: what they are worth.
@@ -62,10 +62,8 @@ if TYPE_CHECKING:
     )
     from wildlab.evaluation.identities import Gospa, Identities, Moment, compare_identities, gospa
     from wildlab.evaluation.intervals import (
-        Halves,
         Interval,
         block_mean,
-        compare_halves,
         mean_interval,
         mean_share_interval,
         share_interval,
@@ -84,7 +82,6 @@ __all__ = [
     "ErrorSummary",
     "Gain",
     "Gospa",
-    "Halves",
     "Identities",
     "Interval",
     "Linear",
@@ -102,7 +99,6 @@ __all__ = [
     "block_mean",
     "bootstrap_interval",
     "chi_square_interval",
-    "compare_halves",
     "compare_identities",
     "effective_sample_size",
     "estimate_position_noise",

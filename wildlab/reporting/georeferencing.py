@@ -349,7 +349,6 @@ def limits(
         ("limit-lost", 0 < found.lost <= MANY_LOST * len(found.scored), {"lost": found.lost}),
         ("limit-truth-height", by_truth > 0, {"points": by_truth}),
         ("limit-clock-fitted", manifest.kind != "twin" and abs(rest) > 1e-6, {"offset": f"{rest:+.2f}"}),
-        ("limit-halves", bool(found.halves.disagree), {}),
         ("limit-nearest", found.visible_m == found.visible_m, {"hidden": short_length(found.visible_m)}),
         ("limit-track", "track" in truth, {"sd": measure(truth.get("track", np.nan), "m")}),
         ("limit-wander", diagnosis is not None and diagnosis.counts, {}),
