@@ -92,7 +92,8 @@ def test_a_constant_against_errors_that_wander_is_as_certain_as_its_interval_say
         found = estimate_wander(points, errors, J, SD)
         fit = fit_generalised(J, errors, Covariance(points, found.noise))
         wald = float(fit.x[0] ** 2 * fit.information[0, 0])
-        freedom = degrees_of_freedom(J, fit.x, points, found)
+        freedom, (alone,) = degrees_of_freedom(J, fit.x, points, found)
+        assert alone == pytest.approx(freedom)
         wandering += f.sf(wald, 1, freedom) < 0.05
         alone = fit_generalised(J, errors, Covariance(points, found.noise._replace(share=0.02)))
         white += float(alone.x[0] ** 2 * alone.information[0, 0]) > 3.84

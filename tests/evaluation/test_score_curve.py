@@ -7,7 +7,6 @@ import pytest
 
 from wildlab.errors import WildlabError
 from wildlab.evaluation.matching import (
-    Rule,
     ScoredFrame,
     curve_along_score,
     difference_of_f1,
@@ -53,11 +52,11 @@ def test_by_hand():
 
 
 def test_each_level_is_what_matching_says_of_what_is_above_it():
-    frames, rule = drawn(1), Rule(by="iou")
-    curve = curve_along_score(frames, rule=rule)
+    frames = drawn(1)
+    curve = curve_along_score(frames)
     for row in (0, 7, len(curve.levels) - 1):
         level = curve.levels[row]
-        counts = [match(f.boxes[f.scores >= level], f.labels, rule).counts for f in frames]
+        counts = [match(f.boxes[f.scores >= level], f.labels).counts for f in frames]
         assert curve.counts[row].tolist() == np.sum(counts, axis=0).tolist()
     whole = rates(counts)
     assert curve.f1[-1] == pytest.approx(whole.f1.estimate)

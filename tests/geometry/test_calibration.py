@@ -5,19 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wildlab.geometry.calibration import (
+from wildlab.geometry.calibration import Fit, calibrate, with_covariance
+from wildlab.geometry.camera_poses import CameraPoses, Mount, mount_rotation
+from wildlab.geometry.corrections import (
     BORESIGHT,
+    CLOCK_STEP,
     PARAMETERS,
     Calibration,
-    Fit,
     apply_calibration,
-    calibrate,
     calibration_jacobian,
     georeference_calibrated,
-    with_covariance,
 )
-from wildlab.geometry.camera_poses import CameraPoses, Mount, mount_rotation
-from wildlab.geometry.corrections import CLOCK_STEP
 from wildlab.geometry.frames import euler_to_matrix, rotation_vector_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.studies.sensitivity import TAU2

@@ -21,7 +21,7 @@ from wildlab.evaluation.ellipses import EllipseVerdict
 from wildlab.evaluation.errors import summarise
 from wildlab.evaluation.intervals import Interval
 from wildlab.evaluation.outliers import Outlier
-from wildlab.geometry.calibration import Calibration
+from wildlab.geometry.corrections import Calibration
 from wildlab.messages.catalogue import load_texts
 from wildlab.reporting import georeferencing as page
 from wildlab.reporting import georeferencing as tables

@@ -120,7 +120,7 @@ def judge_accuracy(
     observations
         From `observe` of a flight with truth, with a calibration applied or not.
     rng
-        Draws halves, blocks, and samples of flat rays.
+        Draws blocks, and samples of flat rays.
     deviations
         Standard deviations in place of those that log and manifest state.
 

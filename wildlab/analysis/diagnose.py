@@ -41,6 +41,7 @@ from wildlab.evaluation.causes import (
     held_out,
     leave_out,
     rank_models,
+    told_parameters,
 )
 from wildlab.evaluation.correlated_errors import (
     LASTS_IMAGES,
@@ -58,21 +59,20 @@ from wildlab.evaluation.errors import ErrorSummary, summarise
 from wildlab.evaluation.intervals import Labels
 from wildlab.evaluation.outliers import Outlier, find_outliers
 from wildlab.evaluation.pose_noise import KINDS
-from wildlab.geometry.calibration import (
+from wildlab.geometry.calibration import Fit, fit_points, undetermined_parameter
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.corrections import (
     BORESIGHT,
     BOUNDS,
     PARAMETERS,
     Calibration,
-    Fit,
     calibrated_poses,
     calibration_jacobian,
-    fit_points,
     georeference_calibrated,
-    undetermined_parameter,
 )
-from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.covariances import chi2_quantile
 from wildlab.geometry.frames import Array, Mask
-from wildlab.geometry.robust import student_scale, student_weights
+from wildlab.geometry.robust import student_scale
 from wildlab.geometry.uncertainty import ground_jacobians
 
 #: What may be constantly wrong, each with its parameters. Each of `_LENS` holds the one before.
@@ -339,8 +339,6 @@ SEARCHES = 3
 
 #: Images left out one by one where places are not known; of more, so many groups.
 MOST_FOLDS = 40
-#: Models of the least score that are tried once more with only what is told from zero.
-REDUCED = 3
 #: Poses at shifted stamps that are kept: the clocks that every fit with one is begun from, and their steps.
 _SHIFTS = 64
 #: Steps of an estimate, and how often one that makes it worse is halved.
@@ -466,7 +464,7 @@ class _Search:
 
     def far_out(self, fit: Fit) -> tuple[tuple[Outlier, ...], Mask]:
         """What is far out with a fit taken off, and which points (N,) are not."""
-        off, logged = (self._about_things(self.place(*_scaled(one))) for one in (fit, None))
+        off, logged = map(self._about_things, (self.place(*_scaled(fit)), self.logged))
         # A ray that a correction tips over the horizon is out in any case.
         off = np.where(np.isfinite(off), off, np.where(np.isfinite(logged), logged, 0.0))
         whitened = np.einsum("nij,nj->ni", np.linalg.inv(np.linalg.cholesky(self.ellipses)), off)
@@ -484,13 +482,11 @@ class _Search:
         """Search for the cause of the errors of the inliers (N,)."""
         robust = self.fit_robustly(inliers)
         used = inliers & robust.usable & np.isfinite(self.logged).all(axis=1)
-        if not self.places_known:
-            # A thing that is left with one sighting says nothing.
-            count = pd.Series(used).groupby(self.names_of).transform("sum").to_numpy()
-            used &= count > 1
         squared = (robust.r**2).sum(axis=1)
+        # Of normal errors one in a hundred counts for less (Huber): weights of all would make noise small.
         weights = np.ones(len(used))
-        weights[robust.usable] = np.clip(student_weights(squared, student_scale(squared)), 0.05, 1.0)
+        far = student_scale(squared) ** 2 * chi2_quantile(0.99, 2)
+        weights[robust.usable] = far / np.maximum(squared, far)
         names, start = _scaled(robust)
         bounds = np.array([BOUNDS[name] / PARAMETERS[name] for name in names])
         start = np.clip(start, -bounds, bounds)
@@ -498,17 +494,12 @@ class _Search:
         corrected = replace(
             self.chosen, poses=calibrated_poses(Calibration.in_sizes(names, start), self.poses_at)
         )
-        points = _pose_points(corrected, self.order)[0].take(used)
-        # A ray that this tips over the horizon has the derivatives that it was logged with.
-        over = ~np.isfinite(points.derivatives).all(axis=(1, 2))
-        if over.any():
-            logged = _pose_points(self.chosen, self.order)[0].take(used)
-            points = PosePoints(
-                *(
-                    np.where(over.reshape(-1, *[1] * (a.ndim - 1)), b, a)
-                    for a, b in zip(points, logged, strict=True)
-                )
-            )
+        points = _pose_points(corrected, self.order)[0]
+        # A ray that this tips over the horizon says nothing, nor does a thing that is left with one sighting.
+        used &= np.isfinite(points.derivatives).all(axis=(1, 2))
+        if not self.places_known:
+            used &= pd.Series(used).groupby(self.names_of).transform("sum").to_numpy() > 1
+        points = points.take(used)
         points = points._replace(
             own=points.own / weights[used, None, None], pixel=points.pixel / weights[used, None, None]
         )
@@ -579,20 +570,28 @@ class _Search:
 
         images = count_images(self.scored, used)
         models, wild, alike = search_models(model, self.causes, images)
-        for one in sorted(models, key=lambda one: score_model(one, images))[:REDUCED]:
-            told = nonzero(self._calibration(one, used))
-            if told and not any(set(other.fit.names) == set(told) for other in models):
-                sort_in(model(tuple(c for c in one.causes if set(CAUSES[c]) & set(told)), told), models, wild)
-        ranked = order_models(models, images, inliers, self.blocks)
-        winner = models[ranked.winner]
+        tried = len(models) + len(wild)
+        while True:
+            ranked = order_models(models, images, inliers, self.blocks)
+            winner = models[ranked.winner]
+            calibration, fit = self._calibration(winner, used), winner.fit
+            if not winner.causes:
+                break
+            joint, freedom = degrees_of_freedom(fit.J, fit.values, points, wander, places)
+            sd = np.sqrt(np.diagonal(winner.covariance))
+            told = np.array(fit.names)[told_parameters(fit.values, sd, freedom, images)].tolist()
+            if told and len(told) < len(fit.names):
+                # The rest is no part of the cause: the noise that it is told from is hardly known itself.
+                del models[ranked.winner]
+                if not any(set(one.fit.names) == set(told) for one in models):
+                    causes = tuple(cause for cause in winner.causes if set(CAUSES[cause]) & set(told))
+                    sort_in(model(causes, tuple(told)), models, wild)
+                continue
+            wald = float(fit.values @ np.linalg.solve(winner.covariance, fit.values))
+            models[ranked.winner] = replace(winner, chance=chance_of(wald, len(fit.names), joint, tried))
+            calibration = replace(calibration, freedom=freedom)
+            break
         implausible = find_implausible(winner, models, wild, images)
-        calibration = self._calibration(winner, used)
-        if winner.causes:
-            freedom = degrees_of_freedom(winner.fit.J, winner.fit.values, points, wander, places)
-            wald = float(winner.fit.values @ np.linalg.solve(winner.covariance, winner.fit.values))
-            chance = chance_of(wald, len(winner.fit.names), freedom, len(models) + len(wild))
-            models[ranked.winner] = replace(winner, chance=chance)
-            calibration = replace(calibration, n_draws=max(2, round(freedom) + 1))
         return Diagnosis(
             self.scored, self.blocks, tuple(models), ranked, calibration, tuple(alike), (), inliers,
             implausible, noise, self.places_known, bool(self.cut[used].mean() > MANY_OUT),
@@ -638,10 +637,8 @@ def _cut(chosen: Observations) -> Mask:
     return table.set_index("detection_id").loc[names, "touches_border"].to_numpy(float) > 0
 
 
-def _scaled(fit: Fit | None) -> tuple[tuple[str, ...], Array]:
-    """Names and values in their usual sizes; nothing for the poses as logged."""
-    if fit is None:
-        return (), np.zeros(0)
+def _scaled(fit: Fit) -> tuple[tuple[str, ...], Array]:
+    """Names and values in their usual sizes."""
     return fit.names, fit.values / np.array([PARAMETERS[name] for name in fit.names])
 
 

@@ -20,8 +20,8 @@ from wildlab.evaluation.intervals import time_blocks
 from wildlab.files import write_atomic, write_csv
 from wildlab.flight.clocks import between, frame_times, gimbal_angles, pose_finder, poses_at, truth_at
 from wildlab.flight.store import Flight
-from wildlab.geometry.calibration import Calibration, PosesAt, calibrated_poses
 from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.corrections import Calibration, PosesAt, calibrated_poses
 from wildlab.geometry.covariances import ellipse_axes, inside_ellipse, pose_covariance
 from wildlab.geometry.frames import Array, Indices, Mask, ned_to_geodetic
 from wildlab.geometry.georeference import RAY_STATUS, Terrain, georeference_pixels, pixels_to_terrain
@@ -401,23 +401,6 @@ LEVEL, CORNERS = 0.9, 72
 ELLIPSOID = "height above the WGS 84 ellipsoid"
 
 
-def with_axes(points: pd.DataFrame) -> pd.DataFrame:
-    """The points with half axes (m) and bearing (deg) of their 90 % ellipses.
-
-    Parameters
-    ----------
-    points
-        From `wildlab.analysis.georeference.georeference`.
-
-    Returns
-    -------
-    DataFrame
-        With ``long_90_m``, ``short_90_m`` and ``bearing_deg``.
-    """
-    long, short, bearing = ellipse_axes(covariances_of(points))
-    return points.assign(long_90_m=long, short_90_m=short, bearing_deg=np.degrees(bearing) % 180)
-
-
 def write_points(flight: Flight, points: pd.DataFrame, path: Path, source: str = "") -> None:
     """Write points as CSV (metres from the flight's origin), or as GeoJSON with their ellipses as polygons
     (WGS84 longitude, latitude, of points the height above what the flight's heights count from).
@@ -438,45 +421,24 @@ def write_points(flight: Flight, points: pd.DataFrame, path: Path, source: str =
     WildlabError
         Where it ends otherwise.
     """
-    if path.suffix == ".csv":
-        table = _described(flight, points, "down from the flight's origin", source)
-        write_csv(path, table, "%.3f")
-    elif path.suffix == ".geojson":
-        write_atomic(path, points_geojson(flight, points, source, ellipses=True))
-    else:
+    if path.suffix not in SUFFIXES:
         raise WildlabError(
             f"nobody knows how to write {path.suffix!r}", f"end it with {' or '.join(SUFFIXES)}", file=path
         )
-
-
-def points_geojson(flight: Flight, points: pd.DataFrame, source: str = "", *, ellipses: bool = False) -> str:
-    """Points as the text of a GeoJSON file: exact places.
-
-    Parameters
-    ----------
-    flight, points, source
-        As for `write_points`.
-    ellipses
-        Whether a polygon for each ellipse follows the points.
-
-    Returns
-    -------
-    str
-        One feature for each point that has a place.
-    """
+    if path.suffix == ".csv":
+        write_csv(path, _described(flight, points, "down from the flight's origin", source), "%.3f")
+        return
     reference = flight.manifest.vertical.counted_from
     counted = ELLIPSOID if reference == "ellipsoid" else f"height above {reference}"
     table = _described(flight, points, counted, source)
     placed = table[table["north_m"].notna() & table["down_m"].notna()]
     degrees = _degrees(flight, placed[["north_m", "east_m", "down_m"]].to_numpy(float))
     places: list[object] = [[*row[:2].round(8).tolist(), round(float(row[2]), 3)] for row in degrees]
-    features = _features(placed, "Point", places)
-    if ellipses:
-        known = placed[placed["long_90_m"].notna() & placed["short_90_m"].notna()]
-        rings = [[_degrees(flight, one)[:, :2].round(8).tolist()] for one in _rings(known)]
-        features += _features(known, "Polygon", rings)
+    known = placed[placed["long_90_m"].notna() & placed["short_90_m"].notna()]
+    rings = [[_degrees(flight, one)[:, :2].round(8).tolist()] for one in _rings(known)]
+    features = _features(placed, "Point", places) + _features(known, "Polygon", rings)
     content = {"type": "FeatureCollection", "features": features}
-    return json.dumps(content, allow_nan=False, separators=(",", ":"))
+    write_atomic(path, json.dumps(content, allow_nan=False, separators=(",", ":")))
 
 
 def _features(table: pd.DataFrame, kind: str, places: Sequence[object]) -> list[dict[str, object]]:
@@ -490,10 +452,14 @@ def _features(table: pd.DataFrame, kind: str, places: Sequence[object]) -> list[
 
 
 def _described(flight: Flight, points: pd.DataFrame, vertical: str, source: str) -> pd.DataFrame:
-    """The points with what they lie on, and how their ellipses were found."""
+    """The points with what they lie on, and half axes (m) and bearing (deg) of their 90 % ellipses."""
     ground = "level ground" if flight.terrain is None else "terrain"
     kinds = points["ellipse"].fillna("")
-    return with_axes(points).assign(
+    long, short, bearing = ellipse_axes(covariances_of(points))
+    return points.assign(
+        long_90_m=long,
+        short_90_m=short,
+        bearing_deg=np.degrees(bearing) % 180,
         level=LEVEL,
         method=[f"{ground}, ellipse {kind}" if kind else ground for kind in kinds],
         vertical_reference=vertical,

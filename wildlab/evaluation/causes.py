@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import fdtrc
+from scipy.special import fdtrc, stdtr
 
 from wildlab.evaluation.correlated_errors import (
     Covariance,
@@ -26,6 +26,7 @@ from wildlab.evaluation.correlated_errors import (
 )
 from wildlab.evaluation.intervals import PROBABILITY, Interval, Labels, block_mean
 from wildlab.evaluation.outliers import ODDS
+from wildlab.geometry.covariances import chi2_beyond
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -278,6 +279,25 @@ def rank_models(
         and (scores[m] <= scores[winner] + MARGIN or (held and not gain(winner, m).counts))
     )  # fmt: skip
     return Ranked(scores, winner, rivals)
+
+
+def told_parameters(x: Array, sd: Array, freedom: Array, images: int) -> Mask:
+    """Which of P parameters are told from zero at the odds that a model needs to win.
+
+    Parameters
+    ----------
+    x, sd, freedom
+        (P,) estimates, their standard deviations and the degrees of freedom of these: a likelihood takes the
+        noise for known.
+    images
+        How many images they were estimated from.
+
+    Returns
+    -------
+    (P,) bool
+    """
+    chance = chi2_beyond(MARGIN + np.log(images), 1)
+    return np.asarray(2 * stdtr(freedom, -np.abs(x / sd)) <= chance)
 
 
 def chance_of(wald: float, parameters: int, freedom: float, tried: int) -> float:

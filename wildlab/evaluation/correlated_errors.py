@@ -15,6 +15,8 @@ assumed.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -30,8 +32,8 @@ Array = NDArray[np.float64]
 #: Standard deviation of the prior on the logit of the share.
 PRIOR_SHARE = 1.5
 #: Time constants of positions, tilts and headings about which their priors lie, s: minutes for a satellite
-#: fix, tens of seconds for an attitude (H 5.6). Where images have no times, images.
-LASTS_S, LASTS_IMAGES = (60.0, 20.0, 20.0), (10.0, 3.0, 3.0)
+#: fix and a heading, tens of seconds for a tilt (H 5.6). Where images have no times, images.
+LASTS_S, LASTS_IMAGES = (60.0, 20.0, 60.0), (10.0, 3.0, 10.0)
 #: Values at most by which errors of all logged places together are known.
 KNOTS = 100
 #: Which of them each of the six pose errors has.
@@ -137,7 +139,8 @@ class WanderNoise(NamedTuple):
         return WanderNoise(dict(zip(KINDS, sd, strict=True)), share, (position, tilt, heading))
 
 
-class WanderFit(NamedTuple):
+@dataclass(frozen=True)
+class WanderFit:
     """Estimated noise.
 
     Attributes
@@ -150,6 +153,11 @@ class WanderFit(NamedTuple):
 
     noise: WanderNoise
     posterior: Callable[[Array], float]
+
+    @cached_property
+    def uncertainty(self) -> Array:
+        """(9, 9) covariance of these logarithms, by the curvature of the posterior."""
+        return np.asarray(np.linalg.inv(_second_derivatives(self.posterior, self.noise.logarithms)))
 
 
 class Covariance:
@@ -316,15 +324,15 @@ def estimate_wander(
 
 def degrees_of_freedom(
     J: Array, x: Array, points: PosePoints, found: WanderFit, places: Places | None = None
-) -> float:
-    """Degrees of freedom of a test of constants, for the noise is only estimated (Satterthwaite 1946).
+) -> tuple[float, Array]:
+    """Degrees of freedom of tests of constants, for the noise is only estimated (Satterthwaite 1946).
 
     Parameters
     ----------
     J
         (N, 2, P) derivatives by the constants.
     x
-        (P,) their estimate, above all its direction.
+        (P,) their estimate.
     points, places
         As for `estimate_wander`.
     found
@@ -332,19 +340,21 @@ def degrees_of_freedom(
 
     Returns
     -------
-    float
-        Of Wald's statistic of the estimate: two over its squared relative uncertainty.
+    float, (P,)
+        Of Wald's statistic of the estimate, and of each constant alone, one at least: two over the squared
+        relative uncertainty of their variance.
     """
-    moved = (J @ x)[..., None]
-
-    def logarithm(at: Array) -> float:
-        inner, _ = Covariance(points, WanderNoise.from_logarithms(at), places).weigh(moved)
-        return float(np.log(inner[0, 0]))
-
     at, step = found.noise.logarithms, 0.05
-    uncertainty = np.linalg.inv(_second_derivatives(found.posterior, at))
-    slope = np.array([logarithm(at + e) - logarithm(at - e) for e in step * np.eye(len(at))]) / (2 * step)
-    return 2 / max(float(slope @ uncertainty @ slope), 1e-6)
+
+    def variances(noise: Array) -> Array:
+        information = Covariance(points, WanderNoise.from_logarithms(noise), places).weigh(J)[0]
+        return np.append(1 / (x @ information @ x), np.diagonal(np.linalg.inv(information)))
+
+    e = step * np.eye(len(at))
+    slopes = np.array([np.log(variances(at + one) / variances(at - one)) for one in e]) / (2 * step)
+    squared = np.einsum("ip,ij,jp->p", slopes, found.uncertainty, slopes)
+    freedom = np.maximum(2 / np.maximum(squared, 1e-6), 1.0)
+    return float(freedom[0]), freedom[1:]
 
 
 def _second_derivatives(function: Callable[[Array], float], x: Array, h: float = 0.05) -> Array:

@@ -1,15 +1,14 @@
 """Detections against labels: which belong together, and what share was found, with intervals.
 
 A label is a box; a point is a box without extent. A detection and a label belong together where their centres
-are near, or their boxes overlap enough, one to one, so that the sum of the distances is smallest. Frames of a
-clip are alike: intervals draw clips, or frames where each is a clip of its own.
+are near, one to one, so that the sum of the distances is smallest. Frames of a clip are alike: intervals draw
+clips, or frames where each is a clip of its own.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,31 +20,10 @@ from wildlab.evaluation.intervals import Interval, share_interval
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
+#: How far apart the centres of a small label and its detection are at most.
+TOLERANCE_PX = 10.0
 #: Draws of a bootstrap, and the fewest clips that it can draw from: of fewer it is far too narrow.
 DRAWS, FEWEST = 2000, 5
-
-
-@dataclass(frozen=True)
-class Rule:
-    """When a detection and a label can belong together.
-
-    Attributes
-    ----------
-    by
-        ``centre`` by the distance of the centres, ``iou`` by the overlap of the boxes.
-    tolerance_px
-        How far apart centres are at most.
-    half_diagonal
-        Whether half the label's diagonal is enough, where that is more: the detection then lies within the
-        circle about the box.
-    overlap
-        Intersection over union of the boxes at least.
-    """
-
-    by: Literal["centre", "iou"] = "centre"
-    tolerance_px: float = 10.0
-    half_diagonal: bool = True
-    overlap: float = 0.3
 
 
 class Matches(NamedTuple):
@@ -74,10 +52,10 @@ class Matches(NamedTuple):
         return np.array([len(self.pairs), len(self.invented), len(self.missed)])
 
 
-def match(
-    found: ArrayLike, labels: ArrayLike, rule: Rule | None = None, ignore: ArrayLike | None = None
-) -> Matches:
+def match(found: ArrayLike, labels: ArrayLike, ignore: ArrayLike | None = None) -> Matches:
     """Detections and labels of one frame that belong together.
+
+    Centres are apart by `TOLERANCE_PX` at most, or half of the label's diagonal where that is more.
 
     Parameters
     ----------
@@ -85,8 +63,6 @@ def match(
         (N, 4) boxes: left, top, width, height, px; or (N, 2) points.
     labels
         (M, 4) or (M, 2), likewise.
-    rule
-        None takes the defaults of `Rule`.
     ignore
         (I, 4) boxes whose content is not judged: a detection with its centre inside one is neither right nor
         wrong, unless it belongs to a label.
@@ -105,17 +81,10 @@ def match(
     >>> match([[0, 0, 10, 10], [80, 80, 4, 4]], [[2, 0, 10, 10]]).counts.tolist()
     [1, 1, 0]
     """
-    rule = rule or Rule()
     a, b = _boxes(found, "detections"), _boxes(labels, "labels")
-    if rule.by == "centre":
-        apart = np.linalg.norm(_centres(a)[:, None] - _centres(b)[None], axis=2)
-        reach = np.full(len(b), rule.tolerance_px)
-        if rule.half_diagonal:
-            reach = np.maximum(reach, np.hypot(b[:, 2], b[:, 3]) / 2)
-        cost, allowed = apart / reach, apart <= reach
-    else:
-        shared = _iou(a, b)
-        cost, allowed = 1 - shared, shared >= rule.overlap
+    apart = np.linalg.norm(_centres(a)[:, None] - _centres(b)[None], axis=2)
+    reach = np.maximum(TOLERANCE_PX, np.hypot(b[:, 2], b[:, 3]) / 2)
+    cost, allowed = apart / reach, apart <= reach
     # A pair that is not allowed costs as much as all that are, so that as many as possible belong together.
     rows, columns = linear_sum_assignment(np.where(allowed, cost, 1.0 + min(len(a), len(b)) * 2.0))
     fits = allowed[rows, columns]
@@ -312,14 +281,6 @@ def _centres(boxes: Array) -> Array:
     return np.asarray(boxes[:, :2] + boxes[:, 2:] / 2)
 
 
-def _iou(a: Array, b: Array) -> Array:
-    low = np.maximum(a[:, None, :2], b[None, :, :2])
-    high = np.minimum((a[:, :2] + a[:, 2:])[:, None], (b[:, :2] + b[:, 2:])[None])
-    shared = np.clip(high - low, 0, None).prod(axis=2)
-    both = a[:, 2:].prod(axis=1)[:, None] + b[:, 2:].prod(axis=1)[None] - shared
-    return np.asarray(np.divide(shared, both, out=np.zeros_like(shared), where=both > 0))
-
-
 def _inside(points: Array, boxes: Array) -> NDArray[np.bool_]:
     beyond = points[:, None] - boxes[None, :, :2]
     within = np.all((beyond >= 0) & (beyond <= boxes[None, :, 2:]), axis=2)
@@ -401,9 +362,7 @@ def score_levels(scores: ArrayLike, most: int = MOST_LEVELS) -> Array:
     return np.asarray(known[np.unique(np.linspace(0, len(known) - 1, most).round().astype(int))])
 
 
-def curve_along_score(
-    frames: Sequence[ScoredFrame], groups: Sequence[object] | None = None, rule: Rule | None = None
-) -> Curve:
+def curve_along_score(frames: Sequence[ScoredFrame], groups: Sequence[object] | None = None) -> Curve:
     """Precision and recall of detections along their score.
 
     Parameters
@@ -412,8 +371,6 @@ def curve_along_score(
         All frames that are judged, those without detections too.
     groups
         (F,) to which clip a frame belongs; None takes each for its own.
-    rule
-        When a detection and a label belong together.
 
     Returns
     -------
@@ -442,7 +399,7 @@ def curve_along_score(
         taken = (one.scores[None] >= levels[:, None]).sum(axis=1)
         order = np.argsort(-one.scores, kind="stable")
         of_count = {
-            int(count): match(one.boxes[order[:count]], one.labels, rule, one.ignore).counts
+            int(count): match(one.boxes[order[:count]], one.labels, one.ignore).counts
             for count in np.unique(taken)
         }
         counts[row] = np.array([of_count[int(count)] for count in taken]).reshape(-1, 3)

@@ -19,14 +19,11 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.camera_poses import CameraPoses, Mount
 from wildlab.geometry.corrections import (
     BORESIGHT,
-    BOUNDS,
     CLOCK_STEP,
     PARAMETERS,
     Calibration,
     PosesAt,
     apply_calibration,
-    calibrated_camera,
-    calibrated_poses,
     calibration_jacobian,
     georeference_calibrated,
 )
@@ -34,25 +31,6 @@ from wildlab.geometry.covariances import independent_count
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.geometry.robust import fit_linear, student_cost, student_scale
-
-__all__ = [
-    "BORESIGHT",
-    "BOUNDS",
-    "PARAMETERS",
-    "Calibration",
-    "Fit",
-    "PosesAt",
-    "apply_calibration",
-    "calibrate",
-    "calibrated_camera",
-    "calibrated_poses",
-    "calibration_jacobian",
-    "fit_points",
-    "georeference_calibrated",
-    "split_images",
-    "undetermined_parameter",
-    "with_covariance",
-]
 
 #: Smallest singular value of the normalised derivatives: 0.1 is two columns with a correlation of 0.99.
 PARALLEL = 0.1
@@ -145,7 +123,7 @@ def fit_points(
         r = at(names, scaled)
         cost = student_cost((r**2).sum(axis=1))
         for _ in range(ROUNDS if names else 0):
-            step = fit_linear(derivative(names, scaled), r).x
+            step = fit_linear(derivative(names, scaled), r)
             for _ in range(HALVINGS):
                 trial = at(names, scaled + step)
                 found = student_cost((trial**2).sum(axis=1))
@@ -163,7 +141,7 @@ def fit_points(
         """Where derivatives wider than the wells see nothing to gain; as it was where that is not near."""
         first, reach = scaled, 2 * CLOCK_STEP / PARAMETERS["clock"]
         for _ in range(ROUNDS):
-            step = fit_linear(derivative(names, scaled), at(names, scaled)).x
+            step = fit_linear(derivative(names, scaled), at(names, scaled))
             scaled = scaled + step
             if np.abs(scaled - first).max() > reach:
                 return first
@@ -182,7 +160,7 @@ def fit_points(
             good = np.isfinite(r).all(axis=1)
             if good.mean() < START_SHARE:
                 continue
-            x = fit_linear(others[good], r[good]).x
+            x = fit_linear(others[good], r[good])
             cost = student_cost(((r + others @ x)[good] ** 2).sum(axis=1)) / good.sum()
             if cost < best:
                 best, found = cost, seconds / clock * axis
@@ -290,28 +268,6 @@ def with_covariance(
     )
 
 
-def split_images(image: Sequence[object] | np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Halves for cross-validation.
-
-    Whole images move together, for their points share one pose error.
-
-    Parameters
-    ----------
-    image
-        (N,) which image each point belongs to.
-    rng
-        Shuffles the images.
-
-    Returns
-    -------
-    (N,) bool, whether the image of each point fell into the first half.
-    """
-    labels, index = np.unique(np.asarray(image), return_inverse=True)
-    first = np.zeros(len(labels), bool)
-    first[rng.permutation(len(labels))[: (len(labels) + 1) // 2]] = True
-    return np.asarray(first[index])
-
-
 def _whitening(covariance: ArrayLike | None, n: int) -> Array:
     """(N, 2, 2) factors that give a residual unit covariance; identity without covariances."""
     if covariance is None:
@@ -387,7 +343,7 @@ def _jackknife(J: Array, r: Array, groups: np.ndarray) -> Array:
     n = len(labels)
     if n < 2 or not J.shape[-1]:
         return np.full((J.shape[-1],) * 2, np.nan)
-    without = np.stack([fit_linear(J[groups != g], r[groups != g]).x for g in labels])
+    without = np.stack([fit_linear(J[groups != g], r[groups != g]) for g in labels])
     apart = without - without.mean(axis=0)
     apart *= np.sqrt([n / independent_count(one) for one in apart.T])
     return np.asarray((n - 1) / n * apart.T @ apart)

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import Akima1DInterpolator
 
-from wildlab.geometry.calibration import BORESIGHT, BOUNDS, PARAMETERS, Fit, with_covariance
+from wildlab.geometry.calibration import Fit, with_covariance
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.corrections import Calibration, apply_calibration
+from wildlab.geometry.corrections import BORESIGHT, BOUNDS, PARAMETERS, Calibration, apply_calibration
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.robust import fit_linear, student_cost
@@ -122,7 +122,7 @@ def clock_by_points(
             if good.sum() < 4:
                 break
             J = _derivatives(partial(residuals, offset), angles)[good]
-            step = fit_linear(np.nan_to_num(J), r[good]).x
+            step = fit_linear(np.nan_to_num(J), r[good])
             trial = residuals(offset, angles + step)
             if not np.isfinite(trial[good]).all() or student_cost(_squares(trial[good])) > student_cost(
                 _squares(r[good])
@@ -187,7 +187,7 @@ def _settled(
         by_angle = _derivatives(partial(residuals, float(x[0])), x[1:])[usable]
         J = np.nan_to_num(np.concatenate([by_clock[..., None], by_angle], axis=-1))
         r = np.nan_to_num(r, nan=1e4)
-        step = fit_linear(J, r).x if len(r) else np.zeros(4)
+        step = fit_linear(J, r) if len(r) else np.zeros(4)
         if abs(x[0] + step[0] - start) > APART_S:
             break
         x = x + step

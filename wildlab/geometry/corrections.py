@@ -89,6 +89,8 @@ class Calibration:
         effect that shows).
     n_points, n_images, n_draws
         What it rests on; no draws: not known.
+    freedom
+        (P,) degrees of freedom of the variances; left out, those of the draws.
     """
 
     names: tuple[str, ...]
@@ -98,6 +100,7 @@ class Calibration:
     n_points: int
     n_images: int
     n_draws: int = 0
+    freedom: Array | None = None
 
     @classmethod
     def in_sizes(cls, names: tuple[str, ...], sizes: Array) -> Calibration:
@@ -117,8 +120,10 @@ class Calibration:
         return float(np.sqrt(self.covariance[i, i]))
 
     def interval(self, name: str, probability: float = 0.95) -> tuple[float, float]:
-        """Student's interval of the correction called ``name``, by the number of draws; NaN without one."""
+        """Student's interval of the correction called ``name``; NaN where it was not estimated."""
         freedom = self.n_draws - 1 if self.n_draws > 1 else 1e9
+        if self.freedom is not None and name in self.names:
+            freedom = self.freedom[self.names.index(name)]
         half = float(stdtrit(freedom, (1 + probability) / 2)) * self.sd(name)
         return self.value(name) - half, self.value(name) + half
 

@@ -6,8 +6,6 @@ estimated along with the parameters, by the same weights, so that it is not the 
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -19,46 +17,6 @@ DEGREES = 4.0
 LEAST = 1e-9
 _ROUNDS = 30
 _SETTLED = 1e-4
-
-
-class RobustFit(NamedTuple):
-    """A linear fit under Student's t.
-
-    Attributes
-    ----------
-    x
-        (P,) parameters.
-    scale
-        Standard deviation of one component of the residual, as normal errors of the same middle would have.
-    weights
-        (N,), about one for an ordinary residual and near zero for one that is far out.
-    """
-
-    x: Array
-    scale: float
-    weights: Array
-
-
-def student_weights(squared: ArrayLike, scale: float) -> Array:
-    """Weights of two-dimensional residuals at a scale.
-
-    Parameters
-    ----------
-    squared
-        (N,) squared lengths.
-    scale
-        Of the distribution, in the unit of a length.
-
-    Returns
-    -------
-    (N,), about one for an ordinary residual
-
-    Examples
-    --------
-    >>> student_weights([2.0, 1000.0], 1.0).round(2).tolist()
-    [1.0, 0.01]
-    """
-    return np.asarray((DEGREES + 2) / (DEGREES + np.asarray(squared, float) / scale**2))
 
 
 def student_scale(squared: ArrayLike) -> float:
@@ -85,7 +43,7 @@ def student_scale(squared: ArrayLike) -> float:
     """
     d = np.asarray(squared, float)
     d = d[np.isfinite(d)]
-    return _normal_scale(_raw_scale(d)) if len(d) else float("nan")
+    return _raw_scale(d) / _FACTOR if len(d) else float("nan")
 
 
 def student_cost(squared: ArrayLike) -> float:
@@ -106,8 +64,8 @@ def student_cost(squared: ArrayLike) -> float:
     return float(tail + 2 * len(d) * np.log(scale))
 
 
-def fit_linear(J: ArrayLike, r: ArrayLike) -> RobustFit:
-    """The ``x`` under which ``r + J x`` is most likely.
+def fit_linear(J: ArrayLike, r: ArrayLike) -> Array:
+    """The ``x`` (P,) under which ``r + J x`` is most likely.
 
     Parameters
     ----------
@@ -118,7 +76,7 @@ def fit_linear(J: ArrayLike, r: ArrayLike) -> RobustFit:
 
     Returns
     -------
-    RobustFit
+    (P,)
 
     Raises
     ------
@@ -132,8 +90,7 @@ def fit_linear(J: ArrayLike, r: ArrayLike) -> RobustFit:
     >>> rng = np.random.default_rng(1)
     >>> r = rng.normal(3.0, 1.0, (100, 2))
     >>> r[:10] = 80.0
-    >>> fit = fit_linear(np.tile(-np.eye(2), (100, 1, 1)), r)
-    >>> bool(np.abs(fit.x - 3.0).max() < 0.3)
+    >>> bool(np.abs(fit_linear(np.tile(-np.eye(2), (100, 1, 1)), r) - 3.0).max() < 0.3)
     True
     """
     J, r = np.asarray(J, float), np.asarray(r, float)
@@ -147,7 +104,7 @@ def fit_linear(J: ArrayLike, r: ArrayLike) -> RobustFit:
         length = np.linalg.norm(flat, axis=0)
         flat = flat / np.where(length > 0, length, 1.0)
         for _ in range(_ROUNDS):
-            weighted = np.repeat(student_weights(squared, scale), 2)[:, None] * flat
+            weighted = np.repeat(_weights(squared, scale), 2)[:, None] * flat
             step = np.linalg.lstsq(weighted.T @ flat, -weighted.T @ target, rcond=None)[0]
             moved = np.abs(flat @ (step - x)).max()
             x = step
@@ -156,14 +113,19 @@ def fit_linear(J: ArrayLike, r: ArrayLike) -> RobustFit:
             if moved < _SETTLED * scale:
                 break
         x = x / np.where(length > 0, length, 1.0)
-    return RobustFit(x, _normal_scale(scale), student_weights(squared, scale))
+    return x
+
+
+def _weights(squared: Array, scale: float) -> Array:
+    """(N,) of two-dimensional residuals by their squared lengths, about one for an ordinary one."""
+    return np.asarray((DEGREES + 2) / (DEGREES + squared / scale**2))
 
 
 def _raw_scale(squared: Array, start: float | None = None, rounds: int = 25) -> float:
     """Scale of the distribution itself, by expectation and maximisation, from the median outwards."""
     scale = max(float(np.sqrt(np.median(squared) / (2 * np.log(2)))) if start is None else start, LEAST)
     for _ in range(rounds):
-        better = max(float(np.sqrt((student_weights(squared, scale) * squared).mean() / 2)), LEAST)
+        better = max(float(np.sqrt((_weights(squared, scale) * squared).mean() / 2)), LEAST)
         if abs(better - scale) < 1e-3 * scale:
             return better
         scale = better
@@ -177,7 +139,3 @@ def _normal_factor() -> float:
 
 
 _FACTOR = _normal_factor()
-
-
-def _normal_scale(scale: float) -> float:
-    return scale / _FACTOR

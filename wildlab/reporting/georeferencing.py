@@ -34,7 +34,7 @@ from wildlab.evaluation.ellipses import EllipseVerdict, is_conservative
 from wildlab.evaluation.errors import ErrorSummary, summarise
 from wildlab.evaluation.outliers import Outlier
 from wildlab.flight.store import Flight
-from wildlab.geometry.calibration import BORESIGHT, Calibration
+from wildlab.geometry.corrections import BORESIGHT, Calibration
 from wildlab.messages.catalogue import Message, PageTexts, load_texts, words
 from wildlab.messages.quantities import length, measure, percent_of, significant
 from wildlab.names import listed
