@@ -118,6 +118,16 @@ def _contains(fence: Array, points: Array) -> Mask:
     return inside
 
 
+def distances_along(points: Array) -> Array:
+    """How far along a way (N, d) each of its points is, (N,): zero at the first."""
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+
+
+def grid_points(*axes: ArrayLike) -> Array:
+    """All points (N, 2) of a grid with these norths and easts, along east first."""
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+
+
 def rectangle(north: float, east: float, length: float, width: float, course: float) -> Array:
     """Corners of a rectangle about its middle, (4, 2) metres, clockwise.
 
