@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from tests.planning.ground import length
 from wildlab.planning.patterns import (
-    AreaWay,
     Pattern,
     check_area,
     contains,
@@ -79,10 +78,10 @@ def test_the_start_says_at_which_corner_rows_begin():
 def test_several_areas_are_visited_in_the_shortest_order():
     """Against every order and every way, by hand."""
     rng = np.random.default_rng(5)
-    ways = [[AreaWay(np.zeros((0, 2, 2)), rng.uniform(0, 100, (2, 2))) for _ in range(2)] for _ in range(5)]
+    ways = [list(rng.uniform(0, 100, (2, 1, 2, 2))) for _ in range(5)]
 
     def flown(order: tuple[int, ...], chosen: tuple[int, ...], back: bool, start: bool) -> float:
-        points = np.concatenate([ways[k][w].points for k, w in zip(order, chosen, strict=True)])
+        points = np.concatenate([ways[k][w][0] for k, w in zip(order, chosen, strict=True)])
         points = np.concatenate([[[0.0, 0.0]], points]) if start else points
         points = np.concatenate([points, points[:1]]) if back else points
         return length(points)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import get_args
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -23,8 +25,7 @@ from wildlab.simulation.onboard_sensors import (
     read_imu,
     read_triad,
 )
-from wildlab.simulation.parameter_groups import Imu
-from wildlab.simulation.parameters import PARTS, TwinParameters, load_twin
+from wildlab.simulation.parameters import PARTS, Group, TwinParameters, load_twin
 from wildlab.simulation.trajectory import Motion, angular_rates, attitude_along, specific_forces, turned
 from wildlab.simulation.twins import simulate
 
@@ -41,8 +42,9 @@ IDEAL = TriadDataSheet(
 )
 
 
-def data_sheet(name: str) -> Imu:
-    return Imu.model_validate(read_toml(PARTS / f"imu-{name}.toml", "an IMU")["imu"])
+def data_sheet(name: str) -> Group:
+    model = get_args(TwinParameters.model_fields["imu"].annotation)[0]
+    return model.model_validate(read_toml(PARTS / f"imu-{name}.toml", "an IMU")["imu"])
 
 
 def allan_deviation(rate: np.ndarray, hertz: float, averaged: int) -> float:

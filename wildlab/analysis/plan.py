@@ -30,7 +30,7 @@ from wildlab.flight.terrain import CutOut, terrain_about
 from wildlab.geometry.frames import Array, Indices, Mask, geodetic_to_ned
 from wildlab.geometry.georeference import Terrain
 from wildlab.planning.courses import Course, fly, no_steeper
-from wildlab.planning.patterns import Pattern, contains, lawn_mowers
+from wildlab.planning.patterns import Pattern, contains, distances_along, grid_points, lawn_mowers
 
 #: Metres above or below its height that a way may be between way points.
 TOLERANCE = 5.0
@@ -185,7 +185,7 @@ def _places(way: Array, spacing: float) -> tuple[Array, Indices, Array]:
         points.append(way[k] + share * (way[k + 1] - way[k]))
         corner += [-1] * (count - 1) + [k + 1]
     places = np.concatenate(points)
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1))])
+    along = distances_along(places)
     return places, np.array(corner), along
 
 
@@ -536,8 +536,7 @@ def nearest_ground(way: HeightProfile, terrain: Terrain, trees: float = 0.0) -> 
     float, metres. Ground that is not known is no ground.
     """
     points = np.column_stack([way.points, way.height - trees])
-    lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    along = np.concatenate([[0.0], np.cumsum(lengths)])
+    along = distances_along(points)
     count = int(min(max(along[-1] / APART, 2), MOST_NEAR)) + 1
     at = np.unique(np.concatenate([np.linspace(0, along[-1], count), along]))
     places = np.stack([np.interp(at, along, points[:, axis]) for axis in range(3)], axis=1)
@@ -548,7 +547,7 @@ def nearest_ground(way: HeightProfile, terrain: Terrain, trees: float = 0.0) -> 
         best = max(float(near.min()), 0.0)
         if np.isfinite(best):
             side = np.linspace(-best, best, across)
-            grid = np.stack(np.meshgrid(side, side, indexing="ij"), axis=-1).reshape(-1, 2)
+            grid = grid_points(side, side)
             near[rows] = np.minimum(near[rows], _distance(places[rows], grid, terrain))
     return float(near.min())
 
@@ -757,7 +756,7 @@ def _check_under(areas: Areas, terrain: Terrain, strip: float) -> None:
         sides = [
             np.linspace(low[k], high[k], max(20, min(200, int((high - low)[k] / strip * 8)))) for k in (0, 1)
         ]
-        points = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 2)
+        points = grid_points(*sides)
         points = np.concatenate([points[contains(area.outline, points)], area.outline])
         unknown = float((~np.isfinite(terrain.heights_at(points))).mean())
         if unknown > MOST_UNKNOWN:

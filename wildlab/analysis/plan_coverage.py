@@ -33,7 +33,7 @@ from wildlab.planning.gimbal import (
     swing_yaw,
     view_inside,
 )
-from wildlab.planning.patterns import contains
+from wildlab.planning.patterns import contains, distances_along, grid_points
 from wildlab.simulation.error_models import gauss_markov
 
 #: Share of an image's shorter side that its edge is: what lies in it is not counted.
@@ -206,9 +206,9 @@ def _known(terrain: Terrain, points: Array) -> Array:
 def _above(sortie: Sortie, points: Array, times: Array) -> Array:
     """Heights above the ground at times of the course, between the way points, (N,) metres."""
     way = sortie.way
-    far = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(way.points, axis=0), axis=1))])
+    far = distances_along(way.points)
     course = sortie.course
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(course.points, axis=0), axis=1))])
+    along = distances_along(course.points)
     # Way points leave out some of an arc, so both are counted by their share of the whole.
     at = np.interp(times, course.times, along) * far[-1] / max(float(along[-1]), 1e-9)
     return np.interp(at, far, way.height - way.ground)
@@ -248,7 +248,7 @@ def _nodes(
     step = min(step, float((high - low).min()) / 2)
     count = np.maximum(np.ceil((high - low) / step).astype(int), 2)
     north, east = (low[k] + step * (np.arange(count[k]) + 0.5) for k in (0, 1))
-    points = np.stack(np.meshgrid(north, east, indexing="ij"), axis=-1).reshape(-1, 2)
+    points = grid_points(north, east)
     # Corners that differ from a straight fence by less than nodes can tell cost time and nothing else.
     inside = contains(simplified(outline, TOLD * step), points)
     for hole in holes:

@@ -25,7 +25,7 @@ from wildlab.geometry.georeference import intersect_plane, pixel_rays
 from wildlab.paths import DATA
 from wildlab.planning.courses import fly
 from wildlab.planning.gimbal import GimbalAngles, camera_attitudes
-from wildlab.planning.patterns import contains, edge_directions, lawn_mower
+from wildlab.planning.patterns import contains, edge_directions, grid_points, lawn_mower
 
 #: Points to a side on which overlapping areas are counted.
 ACROSS = 200
@@ -85,7 +85,7 @@ def sizes_alone(areas: Sequence[Area]) -> dict[str, float]:
         share = 0.0
         if near:
             side = [low[axis] + (high - low)[axis] * (np.arange(ACROSS) + 0.5) / ACROSS for axis in (0, 1)]
-            points = np.stack(np.meshgrid(*side, indexing="ij"), axis=-1).reshape(-1, 2)
+            points = grid_points(*side)
             points = points[_within(area, points)]
             before = np.zeros(len(points), bool)
             for one in near:

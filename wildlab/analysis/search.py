@@ -18,7 +18,7 @@ from wildlab.geometry.frames import Array, Indices, Mask
 from wildlab.geometry.georeference import Terrain
 from wildlab.geometry.viewsheds import lines_clear
 from wildlab.planning.legs import Flying, Leg, PatternPlanner, Platform, RandomWalk, SearchSensor
-from wildlab.planning.patterns import contains, lawn_mower
+from wildlab.planning.patterns import contains, grid_points, lawn_mower
 from wildlab.planning.planner import (
     SEARCH,
     InformationPlanner,
@@ -451,7 +451,7 @@ def grid_over(areas: Sequence[Array], terrain: Terrain, step: float) -> tuple[Ar
     for number, area in enumerate(areas):
         low, high = area.min(axis=0), area.max(axis=0)
         axes = [np.arange(a + step / 2, b, step) for a, b in zip(low, high, strict=True)]
-        flat = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+        flat = grid_points(*axes)
         flat = flat[contains(area, flat)] if len(flat) else flat
         up = terrain.heights_at(flat)
         if not len(flat) or not np.isfinite(up).all():

@@ -6,11 +6,7 @@ the images. Where on the way from one image to the other pixel and pose belong, 
 gimbal: its mean orientation); here it is half way, for pixel and pose, which leaves an error of second order
 in that time.
 
-How wrong a velocity from optical flow may be: a 2x2 covariance from all that it is computed from.
-
-With the ray ``d`` (depth 1), its depth ``h = drop / d_z`` and ``w`` by which the ray turns, all in n, the
-velocity over the plane is ``O (v + h w)``, where ``O = [I, -d_h / d_z]`` lets a vector slide along the ray
-onto the plane. That is H (5.30) without an inverse, and its derivatives follow by hand.
+How wrong a velocity may be follows from all that it is computed from, to first order.
 """
 
 from __future__ import annotations
@@ -20,9 +16,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.linalg import block_diag
 
 from wildlab.errors import WildlabError
-from wildlab.geometry.camera import normalise, normalise_jacobian
+from wildlab.geometry.camera import Camera, normalise, normalise_jacobian
 from wildlab.geometry.camera_poses import CameraPoses, Mount
 from wildlab.geometry.frames import (
     Array,
@@ -267,7 +264,7 @@ def target_velocity(
     >>> print(target_velocity(poses, motion, [[320.0, 256.0]], [[0.0, 0.0]], 0.0).round(6))
     [[18.  1.]]
     """
-    pixels, _ = matching(poses, uv, plane_down)
+    pixels, planes = matching(poses, uv, plane_down)
     measured = np.asarray(flow, float)
     if measured.shape != pixels.shape:
         raise WildlabError(
@@ -275,12 +272,33 @@ def target_velocity(
             "give one flow for each pixel",
             field="flow",
         )
-    by_twist = flow_matrix(poses, pixels, plane_down)
-    own = measured - _made_by(by_twist, camera_twist(poses, motion))
-    # The third column, of the velocity downward, is discarded: the target stays on the plane (H 5.29, 5.30).
-    R_cn = np.swapaxes(poses.R_nc, -1, -2)
-    A = by_twist[..., :3] @ R_cn[..., :, :2]
-    return np.asarray(np.linalg.solve(A, own[..., None])[..., 0])
+    rates = _turned(poses.R_nb, camera_rates(poses, motion))
+    return _over_plane(
+        poses.camera, pixels, measured, poses.p_nc, poses.R_nc, lens_velocity(poses, motion), rates, planes
+    )
+
+
+def _over_plane(
+    camera: Camera, uv: Array, flow: Array, p_nc: Array, R_nc: Array, v: Array, w: Array, plane: Array
+) -> Array:
+    """The velocity on the plane, from velocity and rates of the lens in n; axes are broadcast.
+
+    With the ray ``d`` (depth 1), its depth ``h = drop / d_z`` and ``d'`` by which it turns, all in n, what is
+    seen moves by ``v + h d'``, slid along the ray onto the plane: H (5.30) without an inverse.
+    """
+    xy = normalise(camera, uv)
+    slide = np.einsum("...ij,...j->...i", normalise_jacobian(camera, xy), flow)
+    ray = _turned(R_nc, np.concatenate([xy, np.ones((*xy.shape[:-1], 1))], axis=-1))
+    turning = np.cross(w, ray) + _turned(R_nc[..., :2], slide)
+    drop = plane - p_nc[..., 2]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        steep = np.where((ray[..., 2] > 0) & (drop > 0), ray[..., 2], np.nan)[..., None]
+        moved = v + drop[..., None] / steep * turning
+        return np.asarray(moved[..., :2] - moved[..., 2:] * ray[..., :2] / steep)
+
+
+def _turned(R: Array, vectors: Array) -> Array:
+    return np.asarray(np.einsum("...ij,...j->...i", R, vectors))
 
 
 def _positive_interval(interval: float) -> float:
@@ -375,7 +393,7 @@ def motion_between(
 
 
 class FlowErrors(NamedTuple):
-    """Covariances of what a velocity is computed from, each given once or in N rows. SI units and radians.
+    """Covariances of what a velocity is computed from. SI units and radians.
 
     Attributes
     ----------
@@ -404,22 +422,13 @@ class FlowErrors(NamedTuple):
     velocity: Array
     rates: Array
     gimbal_rates: Array
-    plane: Array | float
-    interval: Array | float = 0.0
+    plane: float
+    interval: float = 0.0
 
-
-class FlowJacobians(NamedTuple):
-    """Derivatives of the velocity, (N, 2) north and east, with respect to each source of error."""
-
-    pixel: Array  # (N, 2, 2)
-    flow: Array  # (N, 2, 2)
-    pose: Array  # (N, 2, 6)
-    mount: Array  # (N, 2, 3)
-    velocity: Array  # (N, 2, 3)
-    rates: Array  # (N, 2, 3)
-    gimbal_rates: Array  # (N, 2, 2)
-    plane: Array  # (N, 2)
-    interval: Array  # (N, 2), with respect to the logarithm of the time between the images
+    def covariances(self) -> tuple[Array, Array]:
+        """(4, 4) of what each feature has for itself, and (19, 19) of what all have in common."""
+        parts = [np.atleast_2d(np.asarray(one, float)) for one in self]
+        return block_diag(*parts[:2]), block_diag(*parts[2:])
 
 
 class Velocity(NamedTuple):
@@ -429,145 +438,49 @@ class Velocity(NamedTuple):
     covariance: Array
 
 
-def flow_jacobians(
+#: How many errors of each kind `velocity_jacobian` has: of pixel and flow, position and attitude, mount,
+#: velocity and rates, rates of the gimbal, plane, and logarithm of the interval; in this order.
+_SIZES = (2, 2, 3, 3, 3, 3, 3, 2, 1, 1)
+#: What is tried of each, either way.
+_STEPS = np.repeat([1e-3, 1e-3, 1e-3, 1e-5, 1e-5, 1e-3, 1e-5, 1e-5, 1e-3, 1e-5], _SIZES)
+#: Errors of each feature of its own; the others are shared.
+_OWN = 4
+
+
+def velocity_jacobian(
     poses: CameraPoses, motion: CameraMotion, uv: ArrayLike, flow: ArrayLike, plane_down: ArrayLike
-) -> FlowJacobians:
-    """Derivatives of `wildlab.geometry.flow.target_velocity`, north and east.
+) -> Array:
+    """Derivatives of `target_velocity` by the errors of `FlowErrors`, in their order, by central differences.
 
     Parameters
     ----------
     poses, motion, uv, flow, plane_down
-        As there; N pixels.
+        As there; one pose, N pixels.
 
     Returns
     -------
-    FlowJacobians
+    (N, 2, 23)
         Rows of rays that miss the plane are NaN.
-
-    Raises
-    ------
-    WildlabError
-        As there.
     """
-    pixels, planes = matching(poses, uv, plane_down)
-    measured = np.asarray(flow, float)
-    camera, R, R_bc, R_bm = poses.camera, poses.R_nb, poses.R_bc, poses.R_bm
-    xy = normalise(camera, pixels)
-    by_pixel = normalise_jacobian(camera, xy)
-    slide = np.einsum("...ij,...j->...i", by_pixel, measured)
-    d_b = _apply(R_bc, np.concatenate([xy, np.ones((*xy.shape[:-1], 1))], axis=-1))
-    x_b = _apply(R_bc, np.concatenate([slide, np.zeros((*xy.shape[:-1], 1))], axis=-1))
-    rates = camera_rates(poses, motion)
-    w_b = np.cross(rates, d_b) + x_b
-    d_n, w_n = _apply(R, d_b), _apply(R, w_b)
-    drop = np.broadcast_to(planes - poses.p_nc[..., 2], d_n.shape[:-1])
-    hits = (d_n[..., 2] > 0) & (drop > 0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        steep = np.where(hits, d_n[..., 2], np.nan)
-        depth = (drop / steep)[..., None, None]
-        slope = d_n[..., :2] / steep[..., None]
-    onto = np.concatenate([np.broadcast_to(np.eye(2), (*slope.shape, 2)), -slope[..., None]], axis=-1)
-    moved = lens_velocity(poses, motion) + depth[..., 0] * w_n
-    sink = (moved[..., 2] / steep)[..., None, None]
-
-    def through(dd: Array, dw: Array, dv: Array | float = 0.0, dz: Array | float = 0.0) -> Array:
-        """From derivatives (N, 3, k) of ray, of its turning and of the lens's velocity, and (N, k) of its
-        height (down)."""
-        deeper = -(np.asarray(dz) + depth[..., 0] * dd[..., 2, :]) / steep[..., None]
-        change = dv + w_n[..., :, None] * deeper[..., None, :] + depth * dw - sink * dd
-        return np.asarray(onto @ change)
-
-    none = np.zeros((*d_n.shape, 3))
-    eye = none + np.eye(3)
-    R_all, lever = np.broadcast_to(R, none.shape), skew(poses.lever_arm)
-    spin = skew(rates)
-    by_ray = R_bc[..., :, :2] @ by_pixel
-    by_flow = R_all @ by_ray
-    along = R_all @ (spin @ by_ray + R_bc[..., :, :2] @ _bend(poses, pixels, measured))
-    turned = -R_all @ skew(d_b)  # of the ray, by a turn of b: by its error, or a second of its rate
-    around = np.cross(np.broadcast_to(np.asarray(motion.rates, float), d_n.shape), poses.lever_arm)
-    pose = np.empty((*slope.shape, 6))
-    pose[..., :3] = through(none, none, 0.0, eye[..., 2, :])
-    pose[..., 3:] = through(turned, -R_all @ skew(w_b), -R_all @ skew(around), (-R_all @ lever)[..., 2, :])
-    swung = -R_bm @ skew(np.einsum("...ji,...j->...i", R_bm, d_b))
-    slid = -R_bm @ skew(np.einsum("...ji,...j->...i", R_bm, x_b))
-    axes = gimbal_axes(poses.mount, poses.pan)
-    flow_only = through(none[..., :2], by_flow)
-    return FlowJacobians(
-        pixel=through(by_flow, along),
-        flow=flow_only,
-        pose=pose,
-        mount=through(R_all @ swung, R_all @ (spin @ swung + slid)),
-        velocity=through(none, none, eye),
-        rates=through(none, turned, -R_all @ lever),
-        gimbal_rates=through(none[..., :2], turned @ axes),
-        plane=through(none[..., :1], none[..., :1], 0.0, -np.ones((*d_n.shape[:-1], 1)))[..., 0],
-        interval=-np.einsum("...ij,...j->...i", flow_only, measured),
+    errors = np.concatenate([np.diag(_STEPS), -np.diag(_STEPS)])
+    kinds = np.split(errors, np.cumsum(_SIZES)[:-1], axis=1)
+    pixel, flowing, p, turn, swing, v, rates, gimbal, plane, interval = kinds
+    pan_tilt = np.zeros(2) if motion.gimbal_rates is None else np.asarray(motion.gimbal_rates, float)
+    R_nb = poses.R_nb @ rotation_vector_to_matrix(turn)
+    spin = np.asarray(motion.rates, float) + rates
+    all_rates = spin + (pan_tilt + gimbal) @ gimbal_axes(poses.mount, poses.pan).T
+    found = _over_plane(
+        poses.camera,
+        np.asarray(uv, float) + pixel[:, None],
+        (np.asarray(flow, float) + flowing[:, None]) * np.exp(-interval)[:, None],
+        (poses.p_nb + p + R_nb @ poses.lever_arm)[:, None],
+        (R_nb @ poses.R_bm @ rotation_vector_to_matrix(swing) @ poses.R_mc)[:, None],
+        (np.asarray(motion.velocity, float) + v + _turned(R_nb, np.cross(spin, poses.lever_arm)))[:, None],
+        _turned(R_nb, all_rates)[:, None],
+        np.asarray(plane_down, float) + plane,
     )
-
-
-def _apply(R: Array, vectors: Array) -> Array:
-    """(N, 3) turned by (N, 3, 3) or (3, 3)."""
-    return np.asarray(np.einsum("...ij,...j->...i", R, vectors))
-
-
-def _bend(poses: CameraPoses, uv: Array, flow: Array) -> Array:
-    """How the same flow is another one of the ray elsewhere in the image, (N, 2, 2): zero without distortion.
-
-    By central differences of the exact derivative, a hundredth of a pixel either way.
-    """
-    if not poses.camera.distorts:
-        return np.zeros((*uv.shape, 2))
-    columns = []
-    for step in 0.01 * np.eye(2):
-        there, here = (
-            normalise_jacobian(poses.camera, normalise(poses.camera, uv + s)) for s in (step, -step)
-        )
-        columns.append(np.einsum("...ij,...j->...i", there - here, flow) / 0.02)
-    return np.stack(columns, axis=-1)
-
-
-def velocity_covariance(jacobians: FlowJacobians, errors: FlowErrors) -> Array:
-    """Covariance of each velocity on its own, (N, 2, 2) (m/s)^2.
-
-    Parameters
-    ----------
-    jacobians
-        From `flow_jacobians`.
-    errors
-        Of the sources.
-
-    Returns
-    -------
-    (N, 2, 2), NaN where the derivatives are.
-    """
-    return _own(jacobians, errors) + _shared(jacobians, errors)
-
-
-def _own(J: FlowJacobians, errors: FlowErrors) -> Array:
-    """What each feature has for itself."""
-    return _carried(J.pixel, errors.pixel) + _carried(J.flow, errors.flow)
-
-
-def _shared(J: FlowJacobians, errors: FlowErrors) -> Array:
-    """What all features of a pair of images have in common."""
-    return np.asarray(
-        _carried(J.pose, errors.pose)
-        + _carried(J.mount, errors.mount)
-        + _carried(J.velocity, errors.velocity)
-        + _carried(J.rates, errors.rates)
-        + _carried(J.gimbal_rates, errors.gimbal_rates)
-        + _outer(J.plane, errors.plane)
-        + _outer(J.interval, errors.interval)
-    )
-
-
-def _carried(J: Array, covariance: Array) -> Array:
-    return np.asarray(J @ covariance @ np.swapaxes(J, -1, -2))
-
-
-def _outer(J: Array, variance: Array | float) -> Array:
-    return np.asarray(np.asarray(variance)[..., None, None] * J[..., :, None] * J[..., None, :])
+    ahead, back = np.split(found, 2)
+    return np.moveaxis(ahead - back, 0, -1) / (2 * _STEPS)
 
 
 def mean_velocity(
@@ -608,11 +521,11 @@ def mean_velocity(
             field="poses",
         )
     velocities = target_velocity(poses, motion, pixels, flow, plane_down)
-    J = flow_jacobians(poses, motion, pixels, flow, plane_down)
     there = np.isfinite(velocities).all(axis=1)
     if not there.any():
         return Velocity(np.full(2, np.nan), np.full((2, 2), np.nan))
-    J = FlowJacobians(*(part[there] for part in J))
-    own = _own(J, errors).mean(axis=0) / int(there.sum())
-    middle = FlowJacobians(*(part.mean(axis=0) for part in J))
-    return Velocity(velocities[there].mean(axis=0), own + _shared(middle, errors))
+    J = velocity_jacobian(poses, motion, pixels, flow, plane_down)[there]
+    own, shared = errors.covariances()
+    middle, each = J[..., _OWN:].mean(axis=0), J[..., :_OWN]
+    alone = (each @ own @ np.swapaxes(each, 1, 2)).mean(axis=0) / len(J)
+    return Velocity(velocities[there].mean(axis=0), alone + middle @ shared @ middle.T)

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array, wrap
 from wildlab.geometry.georeference import Terrain
-from wildlab.planning.patterns import Pattern
+from wildlab.planning.patterns import Pattern, distances_along
 
 #: Kinds of Dubins' ways: a turn, a straight line or a third turn, a turn. 1 is to the right, -1 to the left.
 _KINDS = ((1, 0, 1), (-1, 0, -1), (1, 0, -1), (-1, 0, 1), (1, -1, 1), (-1, 1, -1))
@@ -65,7 +65,7 @@ class Course(NamedTuple):
         -------
         (N,) metres over ground.
         """
-        far = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(self.points, axis=0), axis=1))])
+        far = distances_along(self.points)
         return np.asarray(np.interp(np.asarray(times, float), self.times, far))
 
     def at(self, times: ArrayLike) -> tuple[Array, Array]:
@@ -304,8 +304,7 @@ class Profile(NamedTuple):
         -------
         (N,) metres upwards in n.
         """
-        step = np.linalg.norm(np.diff(self.points[:, :2], axis=0), axis=1)
-        far = np.concatenate([[0.0], np.cumsum(step)])
+        far = distances_along(self.points[:, :2])
         return np.asarray(np.interp(np.asarray(distances, float), far, -self.points[:, 2]))
 
 
@@ -360,7 +359,7 @@ def follow_terrain(terrain: Terrain, points: ArrayLike, above: float, slope: flo
             "give terrain that holds the whole way, turns too",
             field="terrain",
         )
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(dense, axis=0), axis=1))])
+    along = distances_along(dense)
     height = no_steeper(ground + above, along, slope)
     return Profile(np.column_stack([dense, -height]), height - ground)
 

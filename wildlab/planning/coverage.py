@@ -20,7 +20,7 @@ from wildlab.geometry.compilation import announced, compiled
 from wildlab.geometry.frames import Array, Indices, Mask
 from wildlab.geometry.georeference import Terrain
 from wildlab.geometry.viewsheds import image_border, lines_clear, widest_view
-from wildlab.planning.patterns import check_area, contains
+from wildlab.planning.patterns import check_area, contains, grid_points
 
 
 class Coverage(NamedTuple):
@@ -123,7 +123,7 @@ def nodes_in(terrain: Terrain, fences: list[Array]) -> Indices:
     rows, columns = terrain.height.shape
     north = terrain.north + terrain.step * np.arange(rows)
     east = terrain.east + terrain.step * np.arange(columns)
-    points = np.stack(np.meshgrid(north, east, indexing="ij"), axis=-1).reshape(-1, 2)
+    points = grid_points(north, east)
     owner = np.full(len(points), -1, np.intp)
     for k, fence in enumerate(fences):
         owner[(owner < 0) & contains(fence, points)] = k

@@ -9,7 +9,7 @@ slanted fence unseen, so rows here reach as far as the area does anywhere within
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import pairwise, permutations
 from typing import NamedTuple
 
 import numpy as np
@@ -116,6 +116,16 @@ def _contains(fence: Array, points: Array) -> Mask:
             if (east[k - 1] > points[i, 1]) != (east[k] > points[i, 1]):
                 inside[i] ^= points[i, 0] < north[k - 1] + (points[i, 1] - east[k - 1]) * slope
     return inside
+
+
+def distances_along(points: Array) -> Array:
+    """How far along a way (N, d) each of its points is, (N,): zero at the first."""
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+
+
+def grid_points(*axes: ArrayLike) -> Array:
+    """All points (N, 2) of a grid with these norths and easts, along east first."""
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
 
 
 def rectangle(north: float, east: float, length: float, width: float, course: float) -> Array:
@@ -319,18 +329,13 @@ def lawn_mowers(
     fences = [check_area(one, f"area {k + 1}") for k, one in enumerate(areas)]
     inner = [_block_ways(fence, distance, angle, turn) for fence, angle in zip(fences, wanted, strict=True)]
     chosen = visit_order([ways for ways, _ in inner], start=start, back=back)
-    rows, area, way = [], [], []
-    for k, which in chosen:
-        one = inner[k][0][which]
-        rows.append(one.rows)
-        area.append(np.full(len(one.rows), k))
-        way.append(one.points)
+    rows = [inner[k][0][which] for k, which in chosen]
     flown = np.concatenate(rows)
     along = flown[:, 1] - flown[:, 0]
     return Pattern(
         flown,
-        np.concatenate(area).astype(np.intp),
-        np.concatenate(way),
+        np.repeat([k for k, _ in chosen], [len(one) for one in rows]).astype(np.intp),
+        flown.reshape(-1, 2),
         np.arctan2(along[:, 1], along[:, 0]),
         np.array([apart for _, apart in inner]),
     )
@@ -380,16 +385,16 @@ def rows_over(corners: ArrayLike, distance: float, direction: float) -> tuple[li
 
 def _block_ways(
     fence: Array, distance: float, direction: float | None, turn: float
-) -> tuple[list[AreaWay], float]:
+) -> tuple[list[Array], float]:
     """Ways over one area, each with its own entrance and exit, and the distance between its rows."""
     angle = _best_direction(fence, distance, turn) if direction is None else float(direction)
     rows, step = rows_over(fence, distance, angle)
-    each = [[_way(way) for way in _four_ways(block)] for block in _blocks(rows, angle)]
+    each = [_four_ways(block) for block in _blocks(rows, angle)]
     if len(each) == 1:
         return each[0], step
     # Blocks within a concave area, in the shortest order; the whole may be flown either way round.
-    flown = np.concatenate([each[k][which].rows for k, which in visit_order(each)])
-    return [_way(flown), _way(flown[::-1, ::-1])], step
+    flown = np.concatenate([each[k][which] for k, which in visit_order(each)])
+    return [flown, flown[::-1, ::-1]], step
 
 
 def _best_direction(fence: Array, distance: float, turn: float) -> float:
@@ -435,10 +440,6 @@ def _four_ways(block: Array) -> list[Array]:
     return ways
 
 
-def _way(rows: Array) -> AreaWay:
-    return AreaWay(rows, rows.reshape(-1, 2))
-
-
 def _spans(turned: Array, bottom: float, top: float) -> list[Array]:
     """How far along a polygon reaches anywhere between two lines across: united, (2,) each.
 
@@ -469,40 +470,25 @@ def _spans(turned: Array, bottom: float, top: float) -> list[Array]:
 
 
 #: Up to how many areas every order is looked at.
-EXACT = 9
-
-
-class AreaWay(NamedTuple):
-    """One way over an area.
-
-    Attributes
-    ----------
-    rows
-        (R, 2, 2) metres, in the order flown.
-    points
-        (M, 2) metres, all way points; the first is its entrance, the last its exit.
-    """
-
-    rows: Array
-    points: Array
+EXACT = 6
 
 
 def visit_order(
-    ways: Sequence[Sequence[AreaWay]],
+    ways: Sequence[Sequence[Array]],
     *,
     start: ArrayLike | None = None,
     back: bool = False,
 ) -> list[tuple[int, int]]:
     """The order of areas, and how each is entered, that makes the whole way shortest.
 
-    Every order is looked at for up to `EXACT` areas (dynamic programming over the set of those visited). Of
-    more, a way that goes to the nearest next is improved by turning parts of it round and by moving areas to
-    other places (2-opt, or-opt) until none of that helps: such a way is short, not surely the shortest.
+    Every order is looked at for up to `EXACT` areas. Of more, a way that goes to the nearest next is improved by
+    turning parts of it round and by moving areas to other places (2-opt, or-opt) until none of that helps: such
+    a way is short, not surely the shortest.
 
     Parameters
     ----------
     ways
-        Of each area the ways over it.
+        Of each area the ways over it: rows (R, 2, 2) in metres, in the order flown.
     start
         (2,) where one begins, metres; None begins at any entrance.
     back
@@ -515,37 +501,48 @@ def visit_order(
     Examples
     --------
     >>> import numpy as np
-    >>> from wildlab.planning.patterns import AreaWay, visit_order
-    >>> there = [[AreaWay(np.zeros((0, 2, 2)), np.array([[x, 0.0], [x, 1.0]]))] for x in (5.0, 1.0, 3.0)]
+    >>> from wildlab.planning.patterns import visit_order
+    >>> there = [[np.array([[[x, 0.0], [x, 1.0]]])] for x in (5.0, 1.0, 3.0)]
     >>> visit_order(there, start=[0.0, 0.0])
     [(1, 0), (2, 0), (0, 0)]
     """
     costs = _Costs(ways, start, back)
     if len(ways) <= EXACT:
-        return costs.exact()
-    return costs.improved()
+        each = map(costs.best_ways, permutations(range(len(ways))))
+        return min(each, key=lambda one: (one[0], one[1][::-1]))[1]
+    order = costs.nearest_next()
+    length, chosen = costs.best_ways(order)
+    again = True
+    while again:
+        again = False
+        for changed in _changed(order):
+            shorter, ways_there = costs.best_ways(changed)
+            if shorter < length - 1e-9:
+                order, length, chosen, again = changed, shorter, ways_there, True
+                break
+    return chosen
 
 
 class _Costs:
     """Lengths between all ways, and orders by them."""
 
-    def __init__(self, ways: Sequence[Sequence[AreaWay]], start: ArrayLike | None, back: bool) -> None:
+    def __init__(self, ways: Sequence[Sequence[Array]], start: ArrayLike | None, back: bool) -> None:
         flat = [(k, w) for k, each in enumerate(ways) for w in range(len(each))]
         self.flat = flat
         self.of = [[i for i, (k, _) in enumerate(flat) if k == one] for one in range(len(ways))]
-        entrance = np.array([ways[k][w].points[0] for k, w in flat])
-        leave = np.array([ways[k][w].points[-1] for k, w in flat])
+        entrance = np.array([ways[k][w][0, 0] for k, w in flat])
+        leave = np.array([ways[k][w][-1, 1] for k, w in flat])
         apart = np.linalg.norm(leave[:, None] - entrance[None], axis=-1)
         # What lies within a way counts as well: ways round corners differ.
         self.inner = np.array(
-            [np.linalg.norm(np.diff(ways[k][w].points, axis=0), axis=1).sum() for k, w in flat]
+            [np.linalg.norm(np.diff(ways[k][w].reshape(-1, 2), axis=0), axis=1).sum() for k, w in flat]
         )
         self.apart = apart
         at = None if start is None else np.asarray(start, float)
         self.first = np.zeros(len(flat)) if at is None else np.linalg.norm(entrance - at, axis=-1)
         self.home = np.zeros(len(flat)) if at is None or not back else np.linalg.norm(leave - at, axis=-1)
 
-    def best_ways(self, order: list[int]) -> tuple[float, list[tuple[int, int]]]:
+    def best_ways(self, order: Sequence[int]) -> tuple[float, list[tuple[int, int]]]:
         """The best ways in a given order, and their length."""
         begin = self.of[order[0]]
         length = self.first[begin] + self.inner[begin]
@@ -560,47 +557,8 @@ class _Costs:
         best = int(length.argmin())
         return float(length[best]), [self.flat[one] for one in paths[best]]
 
-    def exact(self) -> list[tuple[int, int]]:
-        """Held and Karp's dynamic programme over sets of areas; ways with the areas."""
-        count, size = len(self.of), len(self.flat)
-        owner = np.array([k for k, _ in self.flat])
-        length = np.full((1 << count, size), np.inf)
-        before = np.full((1 << count, size), -1, int)
-        length[1 << owner, np.arange(size)] = self.first + self.inner
-        for mask in range(1, 1 << count):
-            here = np.flatnonzero(np.isfinite(length[mask]))
-            there = np.flatnonzero((mask >> owner) & 1 == 0)
-            if not len(here) or not len(there):
-                continue
-            total = length[mask, here][:, None] + self.apart[np.ix_(here, there)] + self.inner[there]
-            pick = total.argmin(axis=0)
-            value = total[pick, np.arange(len(there))]
-            masks = mask | (1 << owner[there])
-            better = value < length[masks, there]
-            length[masks[better], there[better]] = value[better]
-            before[masks[better], there[better]] = here[pick[better]]
-        mask = (1 << count) - 1
-        path = [int((length[mask] + self.home).argmin())]
-        while before[mask, path[-1]] >= 0:
-            mask, step = mask ^ (1 << owner[path[-1]]), before[mask, path[-1]]
-            path.append(int(step))
-        return [self.flat[one] for one in path[::-1]]
-
-    def improved(self) -> list[tuple[int, int]]:
-        """Nearest next, then parts turned round or moved until nothing helps."""
-        order = self._nearest_next()
-        length, chosen = self.best_ways(order)
-        again = True
-        while again:
-            again = False
-            for changed in _changed(order):
-                shorter, ways = self.best_ways(changed)
-                if shorter < length - 1e-9:
-                    order, length, chosen, again = changed, shorter, ways, True
-                    break
-        return chosen
-
-    def _nearest_next(self) -> list[int]:
+    def nearest_next(self) -> list[int]:
+        """From one area to that which begins nearest."""
         here = int(self.first.argmin())
         order = [self.flat[here][0]]
         while len(order) < len(self.of):

@@ -20,6 +20,7 @@ from wildlab.geometry.georeference import Terrain
 from wildlab.messages.catalogue import Message, load_texts, words
 from wildlab.messages.quantities import NOTHING
 from wildlab.names import figure_name
+from wildlab.planning.patterns import distances_along
 from wildlab.reporting.charts.drawing import draw_cells, draw_fences, draw_way, mark_place
 from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, map_axes, new_figure
 from wildlab.reporting.notebook_pages import finished_page
@@ -180,7 +181,7 @@ def _show_heights(wording: Wording, plan: Plan, terrain: Terrain) -> None:
     begin, low, high, top = 0.0, np.inf, -np.inf, -np.inf
     for k, one in enumerate(plan.sorties):
         way = one.way
-        along = begin + np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(way.points, axis=0), axis=1))])
+        along = begin + distances_along(way.points)
         places = np.linspace(along[0], along[-1], PLACES)
         where = np.stack([np.interp(places, along, way.points[:, axis]) for axis in (0, 1)], axis=1)
         ground = terrain.heights_at(where) - base

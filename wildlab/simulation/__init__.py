@@ -9,7 +9,7 @@ seed and the sensor's name.
 
 Where a change belongs:
 
-- parameters: `parameters` (a twin's file) with `parameter_groups`, whose values are quantities with units;
+- parameters: `parameters` (a twin's file); which there are, in which unit: ``data/twin_parameters.toml``;
 - motion: `trajectory`, with attitudes and disturbances, along `courses`; what a twin looks for is in
   `target_motion`, and the ground in `landscape`;
 - sensors: `onboard_sensors`, and the `error_models` that they share; what is said of them, and what they are:

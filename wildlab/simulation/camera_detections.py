@@ -19,8 +19,7 @@ from wildlab.simulation.error_models import computer_stamps, stream
 from wildlab.simulation.landscape import ground_heights, twin_land
 from wildlab.simulation.manifest import true_mount, twin_manifest
 from wildlab.simulation.onboard_sensors import gimbal_angles
-from wildlab.simulation.parameter_groups import Animals, Segments, Target
-from wildlab.simulation.parameters import TwinParameters
+from wildlab.simulation.parameters import Group, TwinParameters
 from wildlab.simulation.target_motion import animal_paths, target_outline, target_path
 from wildlab.simulation.trajectory import Motion
 
@@ -170,7 +169,7 @@ def visible_part(polygon: ArrayLike, width: float, height: float) -> Blob:
 
 
 def animal_detections(
-    twin: TwinParameters, animals: Animals, view: Exposures, frames: pd.DataFrame, seed: int
+    twin: TwinParameters, animals: Group, view: Exposures, frames: pd.DataFrame, seed: int
 ) -> pd.DataFrame:
     """Animals as they are marked, where no hill hides them. How high a body is above the ground is not known.
 
@@ -208,7 +207,7 @@ _APART = 5.0  # s without the target in view, after which it is another segment
 
 
 def extended_target_frames_and_detections(
-    twin: TwinParameters, target: Target, view: Exposures, frames: pd.DataFrame, seed: int
+    twin: TwinParameters, target: Group, view: Exposures, frames: pd.DataFrame, seed: int
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """The images of the segments, and the visible part of the target where most of it shows.
 
@@ -242,7 +241,7 @@ def extended_target_frames_and_detections(
     return frames.iloc[images].assign(group=groups).reset_index(drop=True), numbered([table])
 
 
-def _visible(view: Exposures, target: Target, seed: int) -> list[Blob]:
+def _visible(view: Exposures, target: Group, seed: int) -> list[Blob]:
     """Of every image what it shows of the target."""
     corners = target_outline(target, seed)(view.times)
     pixels = np.stack([view.pixels(corners[:, i]) for i in range(corners.shape[1])], axis=1)
@@ -254,7 +253,7 @@ def _visible(view: Exposures, target: Target, seed: int) -> list[Blob]:
     return blobs
 
 
-def _kept(segments: Segments, view: Exposures, blobs: list[Blob], *, fewer: bool) -> tuple[Numbers, Numbers]:
+def _kept(segments: Group, view: Exposures, blobs: list[Blob], *, fewer: bool) -> tuple[Numbers, Numbers]:
     """Numbers of the images that are kept, the first ones that show the target, and of their segments.
 
     ``fewer`` says that there may be fewer images than asked for, in another number of segments.
@@ -367,7 +366,7 @@ def with_subset(twin: TwinParameters, frames: pd.DataFrame, detections: pd.DataF
     return frames.assign(group=np.where(inside, SUBSET, "").astype(object))
 
 
-def _in_view(twin: TwinParameters, view: Exposures, target: Target, uv: Array) -> Numbers:
+def _in_view(twin: TwinParameters, view: Exposures, target: Group, uv: Array) -> Numbers:
     """Numbers of the images that show the target, (K,)."""
     seen = np.flatnonzero(in_image(view.poses.camera, uv, target.border.si))
     wanted = int(target.observations.number)

@@ -24,8 +24,7 @@ from wildlab.geometry.georeference import georeference_pixels
 from wildlab.simulation import kernels
 from wildlab.simulation.landscape import even_times, heights_along
 from wildlab.simulation.manifest import true_mount, twin_manifest
-from wildlab.simulation.parameter_groups import Cable, Enclosure, Loiter
-from wildlab.simulation.parameters import TwinParameters
+from wildlab.simulation.parameters import Group, TwinParameters
 from wildlab.simulation.target_motion import enclosure_axes
 from wildlab.simulation.trajectory import (
     AttitudeDisturbance,
@@ -246,7 +245,7 @@ def _smoothed(knots: Array, rough: Array, interval: float) -> BSpline:
     return BSpline(support, rough, _DEGREE, extrapolate=False)
 
 
-def rows(enclosure: Enclosure, distance: float) -> Array:
+def rows(enclosure: Group, distance: float) -> Array:
     """Corners of a course back and forth over one enclosure, along its length (F 5.2, fig 5.1). (2 K, 2) m.
 
     As many rows as are needed for no point within the fence to be further than half the distance from one;
@@ -259,7 +258,7 @@ def rows(enclosure: Enclosure, distance: float) -> Array:
     return np.asarray(middle + np.outer(ends, along) + np.outer(np.repeat(aside, 2), across))
 
 
-def survey_course(enclosures: Sequence[Enclosure], distance: float) -> Array:
+def survey_course(enclosures: Sequence[Group], distance: float) -> Array:
     """Rows over one enclosure after the other, in their order, and back to the first corner. (M, 2) m.
 
     Each enclosure is entered at the corner nearest to where the one before was left.
@@ -281,7 +280,7 @@ def _mirrored(corners: Array) -> Array:
     return np.asarray(corners.reshape(-1, 2, 2)[:, ::-1].reshape(-1, 2))
 
 
-def cable_heights(cable: Cable, lap: float, duration: float) -> Array:
+def cable_heights(cable: Group, lap: float, duration: float) -> Array:
     """Times and heights over the ground, (K, 2) s and m, lowest at the start of each span of a lap (s)."""
     count = int(np.ceil(duration / lap * cable.spans.number)) * 16 + 1
     span = np.arange(count) / 16
@@ -584,7 +583,7 @@ def _circle(
     altitude_error: Disturbance | None = None,
 ) -> FlightPath:
     """The loiter's path; it begins ``turned`` rad round from where it passes the target."""
-    circle: Loiter | None = twin.loiter
+    circle: Group | None = twin.loiter
     if circle is None:
         raise ValueError("this twin flies no loiter")
     turn: Turn = "clockwise" if circle.turn.text == "clockwise" else "counter-clockwise"

@@ -12,17 +12,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
-from wildlab.flight.files import Strict
 from wildlab.flight.manifest import Manifest, make_manifest
 from wildlab.geometry.camera_poses import Mount, helgesen_misalignment
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.landscape import land_record
-from wildlab.simulation.parameter_groups import Gnss, Imu, Parameter, TwinMount
-from wildlab.simulation.parameters import TwinParameters
+from wildlab.simulation.parameters import Group, Parameter, TwinParameters
 
 
 def twin_manifest(twin: TwinParameters, seed: int) -> Manifest:
@@ -96,14 +94,14 @@ def true_mount(twin: TwinParameters) -> Mount:
     return replace(stated, misalignment=(roll, tilt, pan))
 
 
-def _misalignment(mount: TwinMount) -> tuple[float, float, float]:
+def _misalignment(mount: Group) -> tuple[float, float, float]:
     """Degrees, in the sense of the manifest."""
     return helgesen_misalignment(
         mount.misalignment_roll.number, mount.misalignment_tilt.number, mount.misalignment_pan.number
     )
 
 
-def _imu(imu: Imu) -> dict[str, Any]:
+def _imu(imu: Group) -> dict[str, Any]:
     """The unit's data sheet; a figure that is zero is not stated."""
     figures = {
         "velocity_random_walk_m_s_sqrt_h": imu.accelerometer_random_walk.number,
@@ -120,7 +118,7 @@ def _imu(imu: Imu) -> dict[str, Any]:
     return {"name": imu.name.text, **{name: value for name, value in figures.items() if value > 0}}
 
 
-def _gnss(gnss: Gnss) -> dict[str, Any]:
+def _gnss(gnss: Group) -> dict[str, Any]:
     """The receiver with the first antenna; where the second one is stands in the table."""
     arm = (gnss.first_x.si, gnss.first_y.si, gnss.first_z.si)
     correlated = {
@@ -131,8 +129,6 @@ def _gnss(gnss: Gnss) -> dict[str, Any]:
     known = {name: value for name, value in correlated.items() if value > 0}
     return {"name": gnss.name.text, "lever_arm_m": arm, "latency_s": gnss.latency.si, **known}
 
-
-Part = TypeVar("Part", bound=Strict)
 
 #: What is noisier or calmer than its sheet says, and what has larger or smaller biases, by group; each within
 #: which of the tolerances.
@@ -219,7 +215,7 @@ def as_flown(twin: TwinParameters, seed: int) -> TwinParameters:
     return twin.model_copy(update=found)
 
 
-def _scaled(part: Part, names: tuple[str, ...], within: float, rng: np.random.Generator) -> Part:
+def _scaled(part: Group, names: tuple[str, ...], within: float, rng: np.random.Generator) -> Group:
     factors = rng.uniform(1 - within, 1 + within, len(names))
     return _with(
         part,
@@ -227,7 +223,7 @@ def _scaled(part: Part, names: tuple[str, ...], within: float, rng: np.random.Ge
     )
 
 
-def _with(part: Part, **values: float) -> Part:
+def _with(part: Group, **values: float) -> Group:
     changed: dict[str, Parameter] = {
         name: getattr(part, name).model_copy(update={"value": float(value)}) for name, value in values.items()
     }

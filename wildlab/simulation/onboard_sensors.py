@@ -19,8 +19,7 @@ from scipy.spatial.transform import Rotation
 from wildlab.geometry.frames import USUAL_GRAVITY, Array, Earth, euler_to_matrix, flat_earth, local_earth
 from wildlab.simulation import kernels
 from wildlab.simulation.error_models import gauss_markov, rounded, stream, with_attitude_error
-from wildlab.simulation.parameter_groups import Gimbal, Gnss, Imu, TargetGps
-from wildlab.simulation.parameters import TwinParameters
+from wildlab.simulation.parameters import Group, TwinParameters
 from wildlab.simulation.trajectory import (
     AttitudeDisturbance,
     Motion,
@@ -144,7 +143,7 @@ def read_triad(true: ArrayLike, rate: float, sheet: TriadDataSheet, rng: np.rand
     return noise
 
 
-def triad_data_sheet(imu: Imu, triad: str) -> TriadDataSheet:
+def triad_data_sheet(imu: Group, triad: str) -> TriadDataSheet:
     """Of a unit's triad, ``accelerometer`` or ``gyro``."""
     names = ("random_walk", "bias_stability", "bias_time", "turn_on_bias", "range", "resolution")
     own = [getattr(imu, f"{triad}_{name}").si for name in names]
@@ -152,7 +151,7 @@ def triad_data_sheet(imu: Imu, triad: str) -> TriadDataSheet:
 
 
 def read_imu(
-    force: ArrayLike, angular_rate: ArrayLike, imu: Imu, stream: Callable[[str], np.random.Generator]
+    force: ArrayLike, angular_rate: ArrayLike, imu: Group, stream: Callable[[str], np.random.Generator]
 ) -> tuple[Array, Array]:
     """Readings of a unit with that data sheet, calibrated to the body: (N, 3) m/s^2 and (N, 3) rad/s.
 
@@ -168,7 +167,7 @@ def read_imu(
 _SHARPNESS = 0.98  # of a triangle's corners: the gimbal turns round within about a tenth of its swing
 
 
-def gimbal_angles(gimbal: Gimbal, times: Array) -> tuple[Array, Array]:
+def gimbal_angles(gimbal: Group, times: Array) -> tuple[Array, Array]:
     """True pan and tilt at times (N,) s: (N,) rad each.
 
     Pan goes to and fro at an even pace but for the ends, where it turns round smoothly; at time 0 it passes
@@ -189,7 +188,7 @@ def _swing(periods: Array) -> Array:
     return np.asarray(np.arcsin(_SHARPNESS * np.sin(2 * math.pi * periods)) / math.asin(_SHARPNESS))
 
 
-def gimbal_table(gimbal: Gimbal, duration: float, seed: int) -> pd.DataFrame:
+def gimbal_table(gimbal: Group, duration: float, seed: int) -> pd.DataFrame:
     """What the gimbal says about its angles."""
     times = np.arange(math.floor(duration * gimbal.rate.si + 1e-9) + 1) / gimbal.rate.si
     pan, tilt = gimbal_angles(gimbal, times)
@@ -218,7 +217,7 @@ def antenna_motion(motion: Motion, angular_rate: ArrayLike, arm: ArrayLike) -> t
     return motion.position + motion.R_nb @ r, motion.velocity + np.einsum("nij,nj->ni", motion.R_nb, around)
 
 
-def position_fixes(position: ArrayLike, receiver: Gnss | TargetGps, rng: np.random.Generator) -> Array:
+def position_fixes(position: ArrayLike, receiver: Group, rng: np.random.Generator) -> Array:
     """Positions as a receiver gives them: with a time-correlated error, and noise from fix to fix.
 
     Parameters
@@ -354,7 +353,7 @@ def as_mounted(readings: pd.DataFrame, R_bi: Array) -> pd.DataFrame:
 
 
 def gnss_table(
-    twin: TwinParameters, payload: Trajectory, seed: int, stated: Gnss | None = None
+    twin: TwinParameters, payload: Trajectory, seed: int, stated: Group | None = None
 ) -> pd.DataFrame:
     """Fixes of the two receivers over the whole flight, and the velocity that the first one gives.
 

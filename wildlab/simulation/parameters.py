@@ -11,91 +11,202 @@ as often as is printed: see `TwinParameters.as_moved_from`.
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
+from datetime import datetime
 from functools import partial
 from pathlib import Path
-from typing import Any
+from types import GenericAlias
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import pandas as pd
-from pydantic import Field, PrivateAttr, field_validator, model_validator
+from pydantic import AfterValidator, Field, PrivateAttr, create_model, field_validator, model_validator
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import Strict, check_model, did_you_mean, is_safe_name, read_toml
+from wildlab.geometry.frames import STANDARD_GRAVITY
 from wildlab.paths import DATA
-from wildlab.simulation.parameter_groups import (
-    AirframeFlight,
-    Animals,
-    Assumed,
-    Autopilot,
-    Boresight,
-    Cable,
-    CameraSway,
-    Climb,
-    Enclosure,
-    Gimbal,
-    Gnss,
-    Imu,
-    Land,
-    Loiter,
-    MarkedPair,
-    OnboardClock,
-    Parameter,
-    Place,
-    Route,
-    Segments,
-    Subset,
-    Survey,
-    Target,
-    Tolerance,
-    TruePose,
-    TwinCamera,
-    TwinMount,
-)
 
 TWINS = DATA / "twins"
 PARTS = TWINS / "parts"
+
+#: Units a twin may use, and what one of each is in SI and radians.
+UNITS = {
+    "": 1.0,
+    "1": 1.0,
+    "deg": math.pi / 180,
+    "m": 1.0,
+    "m/s": 1.0,
+    "m/s^2": 1.0,
+    "s": 1.0,
+    "ms": 1e-3,
+    "Hz": 1.0,
+    "ppm": 1e-6,
+    "px": 1.0,
+    "deg/s": math.pi / 180,
+    "deg/h": math.pi / 180 / 3600,
+    "deg/sqrt(h)": math.pi / 180 / 60,
+    "m/s/sqrt(h)": 1 / 60,
+    "mrad": 1e-3,
+    "g": STANDARD_GRAVITY,
+    "mg": 1e-3 * STANDARD_GRAVITY,
+    "ug": 1e-6 * STANDARD_GRAVITY,
+}
+
+
+_TABLE = re.compile(r"[HF] table [A-Z\d]+\.\d+")
+
+
+class Parameter(Strict):
+    """One parameter of a twin: its value, and on whose word.
+
+    ``fitted_to`` names tables as the published numbers name theirs (``H table 5.4``), so that the two can be
+    held against each other.
+    """
+
+    value: float | str
+    unit: str
+    status: Literal["published", "chosen", "fitted"]
+    source: str = ""
+    reason: str = ""
+    fitted_to: tuple[str, ...] = ()
+
+    @field_validator("value", mode="before")
+    @classmethod
+    def _number_or_text(cls, value: Any) -> Any:
+        if isinstance(value, bool) or not isinstance(value, int | float | str):
+            raise ValueError(f"{value!r:.80} is neither a number nor a text; give one or the other")
+        if isinstance(value, float) and not math.isfinite(value):
+            raise ValueError(f"{value} is not a finite number; give one that is")
+        return value
+
+    @model_validator(mode="after")
+    def _accounted_for(self) -> Parameter:
+        if self.status == "published" and not self.source.strip():
+            raise ValueError("the value is called published but names no source; add the section or table")
+        if self.status != "published" and not self.reason.strip():
+            raise ValueError(f"the value is called {self.status} but gives no reason; add a reason")
+        if self.status == "fitted" and not self.fitted_to:
+            raise ValueError('the value is called fitted but not to what; add fitted_to = ["H table 5.4"]')
+        if self.status != "fitted" and self.fitted_to:
+            raise ValueError(
+                f"the value is called {self.status} and has fitted_to; take that out, or call it fitted"
+            )
+        if wrong := [name for name in self.fitted_to if not _TABLE.fullmatch(name)]:
+            raise ValueError(f"{wrong[0]!r:.80} names no table; write it as 'H table 5.4'")
+        return self
+
+    @property
+    def because(self) -> str:
+        """Where the value comes from, in words: source, what it was fitted to, reason."""
+        fitted = f"fitted to {', '.join(self.fitted_to)}" if self.fitted_to else ""
+        return "; ".join(part for part in (self.source, fitted, self.reason) if part)
+
+    @property
+    def number(self) -> float:
+        """The value in the unit of the file."""
+        if isinstance(self.value, str):
+            raise TypeError(f"{self.value!r} is not a number")
+        return self.value
+
+    @property
+    def si(self) -> float:
+        """The value in SI units and radians."""
+        return self.number * UNITS[self.unit]
+
+    @property
+    def text(self) -> str:
+        """The value as text."""
+        return str(self.value)
+
+
+def _fit(kind: Mapping[str, Any], parameter: Parameter) -> Parameter:
+    """Refuse a value that is not of a kind."""
+    value, unit = parameter.value, kind.get("unit")
+    if unit is None:
+        if not isinstance(value, str) or not value.strip() or parameter.unit:
+            raise ValueError("this parameter is not a text; give a text and unit = ''")
+        if kind["words"] and value not in kind["words"]:
+            raise ValueError(f"{value!r} is not known; use one of {', '.join(kind['words'])}")
+        if "moment" in kind:
+            with suppress(ValueError):
+                if datetime.fromisoformat(value).tzinfo is not None:
+                    return parameter
+            raise ValueError(f"{value!r:.80} is not a time; write it as 2018-06-01T10:00:00Z")
+        return parameter
+    if isinstance(value, str):
+        raise ValueError(f"{value!r} is not a number; give the value in {unit or 'no unit'}")
+    if parameter.unit != unit:
+        raise ValueError(f"the unit is {parameter.unit!r}; convert the value and write unit = {unit!r}")
+    low, above, high = (float(kind.get(name, -math.inf)) for name in ("low", "above", "high"))
+    if not (low <= value <= high and value > above):
+        least = f"above {above:g}" if above > low else f"from {low:g}"
+        raise ValueError(f"{value:g} is out of range; give a value {least} to {high:g}")
+    if kind.get("whole") and value != int(value):
+        raise ValueError(f"{value:g} is not a whole number; give one")
+    return parameter
+
+
+class Group(Strict):
+    """Parameters that belong together, as ``data/twin_parameters.toml`` has them."""
+
+    ordered: ClassVar[Sequence[Any]] = ()
+    together: ClassVar[Sequence[Any]] = ()
+
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any: ...
+
+    @model_validator(mode="after")
+    def _agree(self) -> Group:
+        for low, high, *share in self.ordered:
+            if getattr(self, low).number > math.prod(share) * getattr(self, high).number:
+                part = "".join(f"{one:g} of " for one in share)
+                raise ValueError(f"{low} is more than {part}{high}; lower {low} or raise {high}")
+        for names in self.together:
+            if len({getattr(self, name) is None for name in names}) > 1:
+                raise ValueError(f"{', '.join(names)} belong together; give all or none")
+        return self
+
+
+def _models() -> Any:
+    """What a twin's file may say: a model of all groups."""
+    table, groups = read_toml(DATA / "twin_parameters.toml", "the parameters of twins"), dict[str, Any]()
+
+    def field(kind: Any) -> Any:
+        named = isinstance(kind, str)
+        one = groups.get(kind.rstrip("?*")) or table["kinds"][kind.rstrip("?*")] if named else kind
+        if named and kind.endswith("*"):
+            return GenericAlias(dict, (str, one)), Field(default_factory=dict)
+        optional = kind.endswith("?") if named else "optional" in one
+        model = Annotated[Parameter, AfterValidator(partial(_fit, one))] if isinstance(one, dict) else one
+        return (model | None, None) if optional else (model, ...)
+
+    for name, fields in (*table["groups"].items(), ("twin", table["twin"])):
+        rules = {key.lower(): fields.pop(key, ()) for key in ("ORDERED", "TOGETHER")}
+        own = {key: field(kind) for key, kind in fields.items()}
+        groups[name] = create_model(name, __base__=Group, **own)
+        for key, rule in rules.items():
+            setattr(groups[name], key, rule)
+    return groups["twin"]
+
+
+_Twin = _models()
 
 #: What happens to every twin that is loaded: `wildlab.simulation.parameters.varied` moves some parameters.
 CHANGE: ContextVar[Callable[[TwinParameters], TwinParameters] | None] = ContextVar("change", default=None)
 
 
-class TwinParameters(Strict):
-    """The whole of a twin's file."""
+class TwinParameters(_Twin):  # type: ignore[misc, valid-type]
+    """The whole of a twin's file; its groups are those of the table."""
 
     name: str
     section: str
     description: str
     parts: tuple[str, ...] = ()
-    place: Place
-    flight: AirframeFlight
-    loiter: Loiter | None = None
-    route: Route | None = None
-    survey: Survey | None = None
-    climb: Climb | None = None
-    cable: Cable | None = None
-    target: Target | None = None
-    second_target: Target | None = None
-    pair: MarkedPair | None = None
-    subset: Subset | None = None
-    segments: Segments | None = None
-    land: Land | None = None
-    enclosures: dict[str, Enclosure] = Field(default_factory=dict)
-    animals: Animals | None = None
-    camera: TwinCamera
-    mount: TwinMount
-    gimbal: Gimbal | None = None
-    onboard_clock: OnboardClock | None = None
-    autopilot: Autopilot
-    boresight: Boresight | None = None
-    camera_sway: CameraSway | None = None
-    imu: Imu | None = None
-    gnss: Gnss | None = None
-    tolerance: Tolerance | None = None
-    truth: TruePose
-    assumed: Assumed
     _moved_from: TwinParameters | None = PrivateAttr(default=None)
 
     @property
@@ -117,7 +228,7 @@ class TwinParameters(Strict):
 
     @field_validator("enclosures")
     @classmethod
-    def _safe_enclosures(cls, value: dict[str, Enclosure]) -> dict[str, Enclosure]:
+    def _safe_enclosures(cls, value: dict[str, Group]) -> dict[str, Group]:
         for name in value:
             if not is_safe_name(name):
                 raise ValueError(f"{name!r:.80} cannot name an enclosure; use letters, digits, - and _ only")
@@ -133,7 +244,7 @@ class TwinParameters(Strict):
         return value
 
     @property
-    def targets(self) -> list[Target]:
+    def targets(self) -> list[Group]:
         """All targets with a description of their own, in their order; animals are in `animal_motion`."""
         return [target for target in (self.target, self.second_target) if target is not None]
 
@@ -167,6 +278,19 @@ class TwinParameters(Strict):
             yield "land lies under animals; take out land, or describe animals"
         if self.land is not None and self.loiter is not None:
             yield "a loiter does not follow the ground; describe a survey or a route"
+        for target in self.targets:
+            if (target.motion is None) != (target.gps is None):
+                yield (
+                    "a target that moves needs both motion and gps, one that never moves neither; add the "
+                    "one or take out the other"
+                )
+            if target.outline is not None and target.motion is None:
+                yield "an outline needs a motion, whose course is where the bow points; add motion"
+            if (target.choice.text == "largest") != (target.outline is not None):
+                yield (
+                    'what has an outline is marked where most of it shows; write choice = "largest" with an '
+                    "outline, and only then"
+                )
         names = [target.identifier.text for target in self.targets]
         if len(set(names)) < len(names):
             yield "two targets have the same identifier; give each its own"

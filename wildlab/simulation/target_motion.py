@@ -13,19 +13,18 @@ from wildlab.geometry.frames import Array
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.landscape import ground_heights
 from wildlab.simulation.onboard_sensors import position_fixes
-from wildlab.simulation.parameter_groups import Animals, Enclosure, Target, TargetMotion
-from wildlab.simulation.parameters import TwinParameters
+from wildlab.simulation.parameters import Group, TwinParameters
 from wildlab.simulation.trajectory import Signal, band_limited_disturbance
 
 
-def enclosure_axes(enclosure: Enclosure) -> tuple[Array, Array, Array]:
+def enclosure_axes(enclosure: Group) -> tuple[Array, Array, Array]:
     """Middle (2,) m, and unit vectors along the length and the width, (2,) each; north and east."""
     cos, sin = np.cos(enclosure.course.si), np.sin(enclosure.course.si)
     middle = np.array([enclosure.north.si, enclosure.east.si])
     return middle, np.array([cos, sin]), np.array([-sin, cos])
 
 
-def enclosure_corners(enclosure: Enclosure) -> Array:
+def enclosure_corners(enclosure: Group) -> Array:
     """North and east of the corners of the fence, in order, (4, 2) m."""
     middle, along, across = enclosure_axes(enclosure)
     half = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * [enclosure.length.si / 2, enclosure.width.si / 2]
@@ -39,8 +38,8 @@ def reflected(walk: Array, limit: float) -> Array:
 
 
 def animal_path(
-    enclosure: Enclosure,
-    animals: Animals,
+    enclosure: Group,
+    animals: Group,
     duration: float,
     rng: np.random.Generator,
     ground: Callable[[Array], Array] | None = None,
@@ -82,7 +81,7 @@ def animal_paths(twin: TwinParameters, seed: int) -> dict[str, Signal]:
     return named
 
 
-def animals_truth(twin: TwinParameters, animals: Animals, seed: int) -> pd.DataFrame:
+def animals_truth(twin: TwinParameters, animals: Group, seed: int) -> pd.DataFrame:
     """Where each animal was at the rate of ``animals.rate``."""
     times = np.arange(int(twin.flight.duration.si * animals.rate.si + 1e-9) + 1) / animals.rate.si
     tables = []
@@ -95,7 +94,7 @@ def animals_truth(twin: TwinParameters, animals: Animals, seed: int) -> pd.DataF
     return pd.concat(tables, ignore_index=True)
 
 
-def target_path(target: Target, seed: int) -> Signal:
+def target_path(target: Group, seed: int) -> Signal:
     """Where a target is. Without a motion it stays at its height above the origin of n.
 
     Parameters
@@ -135,7 +134,7 @@ def target_path(target: Target, seed: int) -> Signal:
     return path
 
 
-def way_along(motion: TargetMotion, times: ArrayLike) -> Array:
+def way_along(motion: Group, times: ArrayLike) -> Array:
     """How far a target has come along its course, without its deviations.
 
     Where it is faster in the beginning it starts from behind, so that later it is where a target with the
@@ -160,7 +159,7 @@ def way_along(motion: TargetMotion, times: ArrayLike) -> Array:
     return np.asarray(steady - (motion.early_speed.si - motion.speed.si) * slowing * np.exp(-t / slowing))
 
 
-def target_outline(target: Target, seed: int) -> Signal:
+def target_outline(target: Group, seed: int) -> Signal:
     """Corners of a target's outline in n: times (N,) s -> (N, 4, 3) m, the bow along its mean course.
 
     Raises
@@ -179,7 +178,7 @@ def target_outline(target: Target, seed: int) -> Signal:
     return lambda times: np.asarray(path(times)[:, None] + corners)
 
 
-def truth_table(target: Target, duration: float, seed: int) -> pd.DataFrame:
+def truth_table(target: Group, duration: float, seed: int) -> pd.DataFrame:
     """What counts as the truth about a target: a surveyed point, or the log of its receiver.
 
     The antenna may be ahead of the middle that a camera sees, along the target's mean course.
