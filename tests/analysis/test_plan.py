@@ -204,7 +204,7 @@ def test_where_one_takes_off(field):
     assert made.home[0] == pytest.approx(
         -161.4, abs=0.5
     )  # 0.001 deg below the field, about the areas' middle
-    with refused("swapped"):
+    with refused("exchanged"):
         plan(field, home=(16.46, 58.66))
     with refused("km from the areas"):
         plan(field, home=(-58.66, 16.46))

@@ -38,6 +38,7 @@ from wildlab.flight.files import (
     gdal,
     inside,
     is_safe_name,
+    parse_toml,
     printable,
     read_regular,
     regular_size,
@@ -152,7 +153,12 @@ def accept_changes(folder: Path) -> list[str]:
     now = tables | {FILE_NAME: _of_text(text), STATED: _of_places(read_manifest(path).locations)}
     changed = [name for name in sorted({*before, *now}) if before.get(name) != now.get(name)]
     if changed:
-        write_atomic(path, with_checksums(text, tables))
+        new = with_checksums(text, tables)
+        # What looks like the part may stand inside of a text of several lines.
+        if parse_toml(new, path) | {PART: None} != parse_toml(text, path) | {PART: None}:
+            problem = "a text in it has a line that reads [checksums]"
+            raise WildlabError(problem, "reword that line", file=path, field=PART)
+        write_atomic(path, new)
     return changed
 
 

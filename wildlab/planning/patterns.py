@@ -481,9 +481,9 @@ def visit_order(
 ) -> list[tuple[int, int]]:
     """The order of areas, and how each is entered, that makes the whole way shortest.
 
-    Every order is looked at for up to `EXACT` areas. Of more, a way that goes to the nearest next is improved by
-    turning parts of it round and by moving areas to other places (2-opt, or-opt) until none of that helps: such
-    a way is short, not surely the shortest.
+    Every order is looked at for up to `EXACT` areas. Of more, a way that goes to the nearest next is improved
+    by turning parts of it round and by moving areas to other places (2-opt, or-opt) until none of that helps:
+    such a way is short, not surely the shortest.
 
     Parameters
     ----------

@@ -520,7 +520,7 @@ def groups_of(twin: TwinParameters) -> dict[str, tuple[str, ...]]:
     Parameters
     ----------
     twin
-        As `wildlab.simulation.load_twin` gives it.
+        As `load_twin` gives it.
 
     Returns
     -------

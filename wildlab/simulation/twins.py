@@ -79,7 +79,7 @@ def simulate(twin: TwinParameters, seed: int, without: Collection[str] = ()) -> 
     Parameters
     ----------
     twin
-        As :func:`~wildlab.simulation.load_twin` gives it.
+        As `wildlab.simulation.parameters.load_twin` gives it.
     seed
         A whole number from 0.
     without
