@@ -320,3 +320,13 @@ def test_the_error_of_a_logged_truth_is_not_taken_for_that_of_pixels_and_poses()
         noisy = replace(flight, tables={**flight.tables, "truth": truth.assign(sd_horizontal_m=stated)})
         seen = observe(noisy, "camera" if "camera" in flight.nav else None)
         assert low < diagnose(seen, score(noisy, seen)).noise.sd["pixel"] < high
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 5, 7])
+def test_a_heading_that_wanders_for_a_third_of_the_flight_is_no_constant_beside_the_tilt(seed):
+    wander = {"wanders_s": 60.0, "heading_deg": 1.5, "stated_heading_deg": 1.5}
+    found = diagnosed(simulate(Survey(seed=seed, images=30, tilt_deg=4.0, **wander)))
+    low, high = found.calibration.interval("tilt")
+    assert found.counts and found.calibration.names == ("tilt",)
+    assert low <= np.radians(-4.0) <= high

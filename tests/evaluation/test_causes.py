@@ -13,6 +13,7 @@ from wildlab.evaluation.causes import (
     leave_out,
     mean_of_others,
     rank_models,
+    told_parameters,
 )
 from wildlab.evaluation.correlated_errors import Places, PosePoints, WanderNoise
 from wildlab.evaluation.pose_noise import KINDS
@@ -93,3 +94,9 @@ def test_held_out_errors_take_a_part_away_and_make_rivals_of_what_places_as_well
 def test_a_chance_is_that_of_the_f_distribution_for_each_that_was_tried():
     assert chance_of(8.0, 2, 5.0, 10) == pytest.approx(10 * f.sf(4.0, 2, 5.0))
     assert chance_of(0.0, 0, 5.0, 10) == chance_of(0.1, 1, 5.0, 10) == 1.0
+
+
+def test_a_parameter_whose_noise_is_hardly_known_is_not_told_from_zero():
+    """Four standard deviations are, of known noise; with three degrees of freedom one in 36 is so far."""
+    x, sd = np.array([4.0, 4.0, -40.0]), np.ones(3)
+    assert told_parameters(x, sd, np.array([1e6, 3.0, 3.0]), 30).tolist() == [True, False, True]

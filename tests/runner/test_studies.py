@@ -288,7 +288,8 @@ def test_a_flight_with_labelled_markers_is_evaluated(reports, tmp_path, shared_d
     flight = imported(tmp_path, "openathena-f1", shared_data("georeferencing", "openathena-f1"))
     _, outcome = evaluate_flight(flight, reports=reports)
     found = values(outcome.folder)
-    assert found["horizontal_error_mean", "logged-pose"]["value"] <= 3.0
+    # On the ground that the other program took; by the markers' surveyed heights it would be 2.8 m.
+    assert found["horizontal_error_mean", "logged-pose"]["value"] <= 4.8
     assert found["horizontal_error_mean", "logged-pose"]["n"] == 103
     assert 0.8 <= found["ellipse_coverage_90", "logged-pose"]["value"] <= 1.0
     assert outcome.folder is not None and faults(outcome.folder / "report.html") == []
