@@ -180,7 +180,7 @@ def _rate_sd(dx: Array, left: Array) -> float:
 
 
 #: A rate is another than 1 where it is so many of its standard deviations away.
-TOLD_APART = 4.0
+TOLD_APART = 5.0
 #: Receipts before the middle one by more than so many robust standard deviations (and 1 s) are wrong.
 WRONG = 5.0
 #: Fewer pairs do not tell how well they tell a rate.

@@ -456,6 +456,7 @@ WAYS = {
     ("x", "y", "w", "h"): "size",
     ("left_px", "top_px", "width_px", "height_px"): "size",
     ("x_min", "y_min", "x_max", "y_max"): "corners",
+    ("x0", "y0", "x1", "y1"): "corners",
     ("x", "y"): "point",
 }
 CLASS_COLUMNS = ("class", "label", "category")

@@ -272,9 +272,15 @@ def judge_log(found: RawLog) -> RawLog:
 def _filled(part: str, one: Stream) -> dict[str, Any]:
     """Columns with any value; images may be taken before the first fix, and then have no place."""
     columns = dict(one.columns)
-    if one.anywhere and "latitude_deg" in columns:
+    if "latitude_deg" in columns:
         there = placed(columns["latitude_deg"], columns["longitude_deg"])
-        columns |= {name: np.where(there, columns[name], np.nan) for name in PLACE if name in columns}
+        if one.anywhere:
+            columns |= {name: np.where(there, columns[name], np.nan) for name in PLACE if name in columns}
+        else:
+            # Where few rows have a height, all would be of no use beside these.
+            heights = [np.isfinite(values) for name, values in columns.items() if name.startswith("height_")]
+            if 0 < 2 * any_of(heights, len(there))[there].sum() < there.sum():
+                columns = {name: values for name, values in columns.items() if name not in HEIGHTS}
     return {
         name: values
         for name, values in columns.items()
@@ -371,7 +377,7 @@ def judge(part: str, decoded: Stream) -> dict[str, Mask]:
         heights = starting("height_")
         if where and heights:
             without = ~any_of([~np.isnan(one) for one in heights], len(time))
-            if 2 * without[~bad].sum() <= (~bad).sum():
+            if not without[~bad].all():
                 add("no height", without & ~bad)
                 bad = bad | without
     _judge_order(time, have if where else {}, bad, found)

@@ -409,8 +409,8 @@ def focal_px_of(tags: Tags, width: int, height: int) -> tuple[str, float]:
 
     Returns
     -------
-    list of (str, float)
-        What it comes from, and px; empty where nothing is said. Size of a pixel is only taken from tags.
+    str and float
+        Size of a pixel is only taken from tags.
     """
     found: list[tuple[str, float]] = []
     if not width or not height:
@@ -494,7 +494,6 @@ def is_photos(folder: Path) -> bool:
 
 
 _HEIGHTS = ("height_ellipsoid_m", "height_sea_m", "height_home_m")
-_SIDES = (("width_px", "wide"), ("height_px", "high"))
 #: Columns -> what gives them of the tags of an image.
 _COLUMNS: dict[tuple[str, ...], Any] = {
     _HEIGHTS: heights_of,
@@ -552,7 +551,8 @@ def folder_decode(folder: Path, zone: str | None) -> RawLog:
     why = [why or ("" if up else "no height") for why, up in zip(reasons, high, strict=True)]
     columns |= {
         "fix": [fix_of(one) for one in tags],
-        **{name: [size[i] or NAN for size in sizes] for i, (name, _) in enumerate(_SIDES)},
+        "width_px": [width or NAN for width, _ in sizes],
+        "height_px": [height or NAN for _, height in sizes],
         "focal_px": [px for _, px in focal],
         "focal_from": [how for how, _ in focal],
         "camera": cameras,

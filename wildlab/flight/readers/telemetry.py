@@ -635,7 +635,8 @@ def _utc(topics: Mapping[str, Messages]) -> ClockFit | None:
 
 def _vehicle(ulog: Any) -> str:
     about = ulog.msg_info_dict
-    version = ulog.get_version_info_str() if isinstance(about.get("ver_sw_release"), int) else None
+    stated = isinstance(about.get("ver_sw_release"), int)
+    version = (ulog.get_version_info_str() or "(development)") if stated else None
     hardware = about.get("ver_hw")
     words = [about.get("sys_name"), version, f"on {hardware}" if isinstance(hardware, str) else None]
     return printable(" ".join(one for one in words if isinstance(one, str))[:200])
