@@ -66,6 +66,27 @@ def test_claims_are_decided_by_the_interval_of_their_share(report):
     assert (report.claims[2]["low"], report.claims[2]["high"]) == share_interval(30, 50)[1:]
 
 
+@pytest.mark.parametrize(("flights", "reason"), [(3, True), (50, False)])
+def test_flights_that_agree_and_decide_nothing_are_said_to_be_few(report, flights, reason):
+    (row,) = page.decide_claims(report, claims_of("a"), {"a": Check(true=np.ones(flights, bool))}).to_dict(
+        "records"
+    )
+    assert (row["verdict"] == "undecided") == reason == row["share"].endswith("too few to decide")
+
+
+@pytest.mark.parametrize(("kind", "claimed"), [("larger", "> 0"), ("smaller", "< 0"), ("measured", "")])
+def test_a_difference_says_which_sign_is_claimed(report, kind, claimed):
+    first, second = np.array([1.0, 2.0, 4.0]), np.array([2.0, 1.5, 1.0])
+    checks = {
+        "larger": Check.larger(first, second),
+        "smaller": Check.smaller(first, second),
+        "measured": Check(measured=first / second, first=first, second=second),
+    }
+    claims = claims_of("a", threshold=1.0)
+    (row,) = page.decide_claims(report, claims, {"a": checks[kind]}).to_dict("records")
+    assert row["difference"].partition("; claimed ")[2] == claimed
+
+
 def test_a_threshold_is_shown_at_half_and_at_twice(report):
     claims = claims_of("a", threshold=2, reason="as far as one sees")
     measured = np.r_[np.full(50, 1.5), np.full(50, 3.0)]

@@ -76,7 +76,7 @@ CLAIMS_EXPLAINED = (
     "90 %, on most flights above 50 %; likewise it fails below 50 % and does not hold below 10 %. Where the "
     "interval has 50 % in it, it is undecided. A vague word has a threshold, which is ours: the verdicts at "
     "half and at twice of it stand beside, where what is measured can be on either side of them. "
-    "Differences are means over flights, with their 95 % interval."
+    "Differences are means over flights, with their 95 % interval, and the sign that the claim gives them."
 )
 
 
@@ -241,9 +241,7 @@ def decide_claims(
                 "source": claim["source"],
                 "verdict": f"{FITTED} ({claim['fitted']})" if claim.get("fitted") else found.verdict,
                 "share": _share_words(found, check),
-                "difference": ""
-                if apart is None
-                else interval_words(apart, 1 if abs(apart.estimate) >= 10 else 2, check.unit),
+                "difference": "" if apart is None else _difference_words(apart, check),
                 "premise": _premise_words(claim.get("premise", ""), check, found),
                 "threshold": _threshold_words(threshold, at, claim.get("reason", "")),
             }
@@ -267,6 +265,15 @@ def _share_words(found: Any, check: Check) -> str:
     beyond = f", of {found.flights} flights in all" if found.met < found.flights else ""
     beyond += ": too few to decide" if found.verdict == UNDECIDED and found.true in (0, found.met) else ""
     return f"{told} ({low:.0f} to {high:.0f} %){beyond}"
+
+
+def _difference_words(apart: Interval, check: Check) -> str:
+    """A difference of what a check compares, and on which side of zero its claim has it, where it says so."""
+    lead = np.asarray(check.first, float) - np.asarray(check.second, float)
+    true = () if check.true is None else check.true
+    side = next((end for end, so in ((">", lead > 0), ("<", lead < 0)) if np.array_equal(true, so)), "")
+    claimed = f"; claimed {side} 0" if side else ""
+    return interval_words(apart, 1 if abs(apart.estimate) >= 10 else 2, check.unit) + claimed
 
 
 def interval_words(found: Interval, digits: int, unit: str = "", least: float = -np.inf) -> str:
