@@ -551,9 +551,6 @@ def _tiles(studies: Sequence[StudyStatus]) -> list[tuple[str, str]]:
         holding, mostly = (sum(one.verdict == verdict for one in theirs) for verdict in (HOLDS, MOSTLY))
         words = f"claims of the theses hold; {mostly} more on most flights{_waiting(waiting)}"
         tiles.append((f"{holding} / {len(theirs)}", words))
-    if any(study.study.kind == "logged" for study in studies):
-        logged = sum(study.study.kind == "logged" for study in done)
-        tiles.append((str(logged), "done on logged flights"))
     return tiles
 
 
