@@ -9,9 +9,8 @@ from pathlib import Path
 import click
 
 from wildlab.commands import shared
-from wildlab.commands.shared import FOLDER, terminal_console
+from wildlab.commands.shared import FOLDER, count, print_json, print_table, shown, terminal_console
 from wildlab.runner.processes import start_server
-from wildlab.terminal import count, print_json, print_table, shown
 
 jobs = click.option("--jobs", type=click.IntRange(1), default=1, show_default=True, help="Processes.")
 
