@@ -28,6 +28,7 @@ environment: ## create or update .venv from environment.lock (the targets below 
 	@sh tools/environment.sh
 
 reports: environment ## run every study that needs no download, and the tutorials, and say where the pages are
+	@$(BIN)/wildlab run --all --first-look --jobs $(JOBS) $(ARGS)
 	@$(BIN)/wildlab run --all --jobs $(JOBS) $(ARGS)
 	@$(BIN)/python -m wildlab.runner.tutorials --jobs $(JOBS)
 

@@ -44,14 +44,12 @@ MAY_IMPORT: dict[str, set[str]] = {
     "sharing": BELOW_ANALYSIS | {"analysis", "messages", "reporting", "studies", "runner"},
     # What `import wildlab` offers; nothing of wildlab imports it.
     "api": BELOW_ANALYSIS | {"analysis", "reporting", "replay"},
-    "commands": BELOW_ANALYSIS
-    | {"analysis", "messages", "reporting", "studies", "runner", "sharing", "terminal"},
-    "cli": BELOW_ANALYSIS | {"analysis", "reporting", "studies", "runner", "commands", "doctor", "terminal"},
+    "commands": BELOW_ANALYSIS | {"analysis", "messages", "reporting", "studies", "runner", "sharing"},
+    "cli": BELOW_ANALYSIS | {"analysis", "reporting", "studies", "runner", "commands", "doctor"},
     "__main__": {"cli"},
     "summary_table": set(),
     "doctor": set(),
     "lazy": set(),
-    "terminal": set(),
     "errors": set(),
     "files": set(),
     "names": set(),

@@ -20,9 +20,8 @@ from wildlab import __version__
 from wildlab.commands import calibration, evaluation, flights, shared, sharing, studies
 from wildlab.commands.detect import detect
 from wildlab.commands.plan import plan
-from wildlab.commands.shared import FOLDER
+from wildlab.commands.shared import FOLDER, count, print_json, print_table, sentence, shown, stopped
 from wildlab.errors import WildlabError, system_error
-from wildlab.terminal import count, print_json, print_table, sentence, shown, stopped
 
 
 class Commands(click.Group):

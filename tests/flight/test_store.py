@@ -64,7 +64,7 @@ def test_table_values_survive(tmp_path_factory, rows):
     )
     table = conform(TABLES["truth"], truth, "truth")
     path = tmp_path_factory.mktemp("table") / "truth.parquet"
-    store._write(table, path)
+    store.write_table(table, path)
     back = store._read(path.parent, path.name, TABLES["truth"])
     pd.testing.assert_frame_equal(back, table, check_exact=True)
 
@@ -157,7 +157,7 @@ def test_an_interrupted_write_leaves_the_old_flight(make_flight, tmp_path, monke
     def fail(*_: Any) -> None:
         raise error
 
-    monkeypatch.setattr(store, "_write", fail)
+    monkeypatch.setattr(store, "write_table", fail)
     with pytest.raises(error):
         save_flight(make_flight(description="second"), tmp_path / "flight", overwrite=True)
     with pytest.raises(error):

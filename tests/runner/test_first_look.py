@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +14,8 @@ from wildlab.paths import NOTEBOOKS
 from wildlab.runner import run as running
 from wildlab.runner.catalogue import FIRST_LOOK_SEEDS, load_studies
 from wildlab.runner.job import Job
-from wildlab.runner.run import THERE, has_whole_report, make_job, plan_passes, run_studies
+from wildlab.runner.run import THERE, has_whole_report, make_job, run_studies
 from wildlab.runner.scheduling import Outcome
-from wildlab.runner.seeds import write_seed
 
 STUDIES = load_studies(NOTEBOOKS / "studies.toml")
 
@@ -57,26 +55,8 @@ def test_a_quick_study_has_no_first_look_nor_has_one_whose_flights_are_given(tmp
         assert make_job(STUDIES["static-point"], reports=tmp_path, seeds=enough).first_look == {}
 
 
-def test_first_every_page_and_then_the_full_numbers(tmp_path):
-    whole, looks = jobs(tmp_path, "sensitivity", "static-point", "gating")
-    first, second, kept = plan_passes(whole, looks)
-    assert first == [whole[0], looks["static-point"], looks["gating"]]
-    assert second == whole[1:] and kept == []
-
-
-def test_a_full_report_of_the_same_is_not_replaced_by_a_first_look(tmp_path):
-    whole, looks = jobs(tmp_path, "static-point", "gating")
-    for job in whole:
-        leave_report(job)
-    first, second, kept = plan_passes(whole, looks)
-    assert first == [] and second == whole
-    assert [(one.name, one.state, one.reason) for one in kept] == [
-        (job.name, "skipped", THERE) for job in whole
-    ]
-
-
 def test_whatever_is_not_the_full_report_of_the_same_gives_way(tmp_path):
-    (whole,), looks = jobs(tmp_path, "gating")
+    (whole,), _ = jobs(tmp_path, "gating")
     others: list[dict[str, Any]] = [
         {"fingerprint": "another"},
         {"state": "failed"},
@@ -85,26 +65,12 @@ def test_whatever_is_not_the_full_report_of_the_same_gives_way(tmp_path):
     for more in others:
         leave_report(whole, **more)
         assert not has_whole_report(whole)
-        assert plan_passes([whole], looks) == ([looks["gating"]], [whole], [])
     leave_report(whole)
     assert has_whole_report(whole)
     (tmp_path / "gating" / "report.html").unlink()
     assert not has_whole_report(whole)
     (tmp_path / "gating" / "status.json").write_text("[]")
     assert not has_whole_report(whole)
-
-
-def test_a_study_whose_flights_are_all_kept_is_run_in_full_at_once(tmp_path):
-    (whole,), looks = jobs(tmp_path, "static-point")
-    assert whole.seeds is not None
-    *most, last = whole.seeds.seeds
-    for seed in most:
-        write_seed(whole.seeds, seed, {"a/b": 1.0})
-    assert plan_passes([whole], looks) == ([looks[whole.name]], [whole], [])
-    write_seed(whole.seeds, last, {"a/b": 1.0})
-    assert plan_passes([whole], looks) == ([whole], [], [])
-    both = {whole.name: replace(looks[whole.name], first_look={"seeds": (5, 100), "steps": (1, 2)})}
-    assert plan_passes([whole], both).second == [whole], "its notebook takes its time as well"
 
 
 class Studies:
@@ -147,6 +113,11 @@ class Studies:
     def run(self, *names: str, **more: Any) -> list[Outcome]:
         return run_studies(names, notebooks=self.notebooks, reports=self.reports, **more)
 
+    def both(self) -> None:
+        """First looks at all, then the full numbers."""
+        self.run(everything=True, first_look=True)
+        self.run(everything=True)
+
 
 @pytest.fixture
 def studies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Studies:
@@ -156,11 +127,12 @@ def studies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Studies:
 LOOK = {"runs": (2, 9)}
 
 
-def test_all_studies_go_twice_and_one_that_is_named_once(studies):
-    outcomes = studies.run(everything=True)
+def test_of_all_studies_those_run_whose_full_report_is_not_there(studies):
+    studies.both()
     assert studies.passes == [[("quick", {}), ("slow", LOOK), ("other", LOOK)], [("slow", {}), ("other", {})]]
-    assert [(one.name, one.reason) for one in outcomes] == [(n, "whole") for n in ("quick", "slow", "other")]
     studies.passes.clear()
+    outcomes = studies.run(everything=True)
+    assert studies.passes == [] and {(one.state, one.reason) for one in outcomes} == {("skipped", THERE)}
     studies.run("slow", "quick")
     assert studies.passes == [[("slow", {}), ("quick", {})]]
 
@@ -180,7 +152,7 @@ def test_a_first_look_alone(studies):
 
 def test_the_ledger_is_there_before_anything_and_after_each_study_that_takes_a_while(studies, monkeypatch):
     monkeypatch.setattr(running, "LEDGER_EVERY_S", -1.0)
-    studies.run(everything=True)
+    studies.both()
     assert [text.count("not run yet") for text in studies.ledgers] == [3, 2, 1, 0, 0]
     # The words stand on the page itself and in the tile that counts them.
     looks = [text.count('class="look"') for text in [*studies.ledgers, studies.ledger()]]
@@ -190,19 +162,18 @@ def test_the_ledger_is_there_before_anything_and_after_each_study_that_takes_a_w
 
 
 def test_of_quick_studies_the_ledger_is_written_at_the_end(studies):
-    studies.run(everything=True)
-    assert [text.count("not run yet") for text in studies.ledgers] == [3] * 5
+    studies.both()
+    assert [text.count("not run yet") for text in studies.ledgers] == [3, 3, 3, 0, 0]
     assert "3 / 3</b>" in studies.ledger()
 
 
 def test_broken_off_the_ledger_says_what_is_there(studies):
     studies.stop_after = 4
     with pytest.raises(KeyboardInterrupt):
-        studies.run(everything=True)
+        studies.both()
     assert "2 / 3</b>" in studies.ledger() and studies.ledger().count('class="look"') == 1
     studies.stop_after = 99
     studies.passes.clear()
     studies.run(everything=True)
     assert "3 / 3</b>" in studies.ledger()
-    assert ("slow", LOOK) not in studies.passes[0], "its full numbers are there"
-    assert ("slow", {}) in studies.passes[1]
+    assert studies.passes == [[("other", {})]], "what is there is left alone"

@@ -9,9 +9,18 @@ from typing import TYPE_CHECKING
 import click
 
 from wildlab.commands import shared
-from wildlab.commands.shared import ANY, FILE, FOLDER, pair, refuse_existing
+from wildlab.commands.shared import (
+    ANY,
+    FILE,
+    FOLDER,
+    pair,
+    print_json,
+    print_table,
+    refuse_existing,
+    shown,
+    stopped,
+)
 from wildlab.errors import WildlabError
-from wildlab.terminal import print_json, print_table, shown, stopped
 
 if TYPE_CHECKING:
     from wildlab.analysis.camera import CameraClock

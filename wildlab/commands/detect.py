@@ -8,8 +8,7 @@ from typing import Any
 import click
 
 from wildlab.commands import shared
-from wildlab.commands.shared import ANY, FILE, FOLDER, terminal_console
-from wildlab.terminal import count, print_json, sentence, shown
+from wildlab.commands.shared import ANY, FILE, FOLDER, count, print_json, sentence, shown, terminal_console
 
 #: Overlays that the page shows, evenly over the run.
 ON_PAGE = 8

@@ -10,11 +10,19 @@ from typing import TYPE_CHECKING
 import click
 
 from wildlab.commands import shared
-from wildlab.commands.shared import ANY, FILE, FOLDER, refuse_existing, tell_contradictions, terminal_console
+from wildlab.commands.shared import (
+    ANY,
+    FILE,
+    FOLDER,
+    refuse_existing,
+    shown,
+    stopped,
+    tell_contradictions,
+    terminal_console,
+)
 from wildlab.errors import WildlabError
 from wildlab.paths import REPORTS
 from wildlab.runner.processes import start_server
-from wildlab.terminal import shown, stopped
 
 if TYPE_CHECKING:
     from wildlab.runner.scheduling import Outcome

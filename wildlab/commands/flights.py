@@ -11,9 +11,21 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from wildlab.commands import shared
-from wildlab.commands.shared import ANY, FILE, FOLDER, tell_contradictions, terrain_of, terrain_options
+from wildlab.commands.shared import (
+    ANY,
+    FILE,
+    FOLDER,
+    count,
+    print_json,
+    print_table,
+    sentence,
+    shown,
+    stopped,
+    tell_contradictions,
+    terrain_of,
+    terrain_options,
+)
 from wildlab.errors import WildlabError
-from wildlab.terminal import count, print_json, print_table, sentence, shown, stopped
 
 if TYPE_CHECKING:
     from wildlab.flight.card import Proposal, Wishes

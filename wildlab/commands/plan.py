@@ -11,10 +11,18 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from wildlab.commands import shared
-from wildlab.commands.shared import FILE, FOLDER, pair, terminal_console, terrain_of, terrain_options
+from wildlab.commands.shared import (
+    FILE,
+    FOLDER,
+    pair,
+    print_json,
+    shown,
+    terminal_console,
+    terrain_of,
+    terrain_options,
+)
 from wildlab.errors import WildlabError
 from wildlab.paths import DATA
-from wildlab.terminal import print_json, shown
 
 if TYPE_CHECKING:
     from wildlab.geometry.camera import Camera

@@ -11,10 +11,9 @@ from pathlib import Path
 import click
 
 from wildlab.commands import shared
-from wildlab.commands.shared import ANY, FILE, FOLDER, terminal_console
+from wildlab.commands.shared import ANY, FILE, FOLDER, count, print_json, sentence, shown, terminal_console
 from wildlab.errors import WildlabError
 from wildlab.runner.processes import start_server
-from wildlab.terminal import count, print_json, sentence, shown
 
 #: Where a password may stand that nobody types: never on the command line, which others can see.
 VARIABLE = "WILDLAB_SHARE_PASSWORD"

@@ -9,9 +9,8 @@ from pathlib import Path
 import click
 
 from wildlab.commands import shared
-from wildlab.commands.shared import FOLDER, terminal_console
+from wildlab.commands.shared import FOLDER, count, print_json, print_table, shown, terminal_console
 from wildlab.runner.processes import start_server
-from wildlab.terminal import count, print_json, print_table, shown
 
 jobs = click.option("--jobs", type=click.IntRange(1), default=1, show_default=True, help="Processes.")
 
@@ -120,10 +119,10 @@ def run(
 ) -> None:
     """Run studies; each leaves a report.
 
-    The ledger shows them all. Studies kept apart, and those whose data are not here, are not in --all. It
-    goes over them twice: first every report from few flights, then the full numbers in their place. A study
-    that is named runs once, in full; the name of a case (schmidt) stands for all its studies. --seeds N is
-    one pass over N flights.
+    The ledger shows them all. Studies kept apart, those whose data are not here, and those whose full report
+    is there from the same code, are not in --all. --first-look makes reports from few flights; the full
+    numbers take their place. A study that is named runs; the name of a case (schmidt) stands for all its
+    studies.
 
     What was computed for a seed is kept: a run that was broken off goes on where it stopped, and more
     seeds cost only those that are new. The numbers are the same for any --jobs.

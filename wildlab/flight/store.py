@@ -534,9 +534,9 @@ def save_flight(
         if nav:
             (folder_now / "nav").mkdir()
         for source, table in nav.items():
-            _write(table, folder_now / "nav" / f"{source}.parquet")
+            write_table(table, folder_now / "nav" / f"{source}.parquet")
         for name, table in tables.items():
-            _write(table, folder_now / f"{name}.parquet")
+            write_table(table, folder_now / f"{name}.parquet")
         if flight.terrain is not None:
             write_terrain(flight.terrain, folder_now / TERRAIN)
         if calibration is not None:
@@ -548,7 +548,8 @@ def save_flight(
     return Flight(flight.manifest, nav, tables, target, flight.terrain)
 
 
-def _write(table: pd.DataFrame, path: Path) -> None:
+def write_table(table: pd.DataFrame, path: Path) -> None:
+    """Write a table of a flight as Parquet."""
     # Without pandas' own metadata, which names its version: the same flight gives the same bytes.
     plain = arrow.Table.from_pandas(table, preserve_index=False).replace_schema_metadata(None)
     parquet.write_table(plain, path)

@@ -103,11 +103,8 @@ class OwnFlight(NamedTuple):
 
     def number(self, name: str, subject: str) -> Mapping[str, Any] | None:
         """A number of the first report that has it; None where it is in none, or could not be computed."""
-        for one in self.reports:
-            entry = one.numbers.get((name, subject))
-            if entry is not None and entry["value"] is not None:
-                return entry
-        return None
+        entry = self.numbers.get((name, subject))
+        return None if entry is None or entry["value"] is None else entry
 
     def value(self, name: str, subject: str) -> float | None:
         """Its value alone."""
@@ -182,8 +179,8 @@ def flights_page(flights: Sequence[OwnFlight], comparison: str = "") -> str:
 
 #: The pages beside it: the ledger, and how to share.
 LEDGER, PARTNERS = "ledger.html", "partners.html"
-#: Cards of own flights at most, the newest first, and bytes that all small pictures may take.
-MOST_FLIGHTS, MOST_PICTURES = 4, 1_200_000
+#: Cards of own flights at most, the newest first.
+MOST_FLIGHTS = 4
 #: Numbers of the moving picture, which lies beside it; share of a normal distribution that its ellipses hold.
 FLIGHT, PROBABILITY = DATA / "front-flight.json", 0.9
 #: Width of a small picture, pixels; how well it is kept, of 100; most pixels of one that is read.
@@ -440,7 +437,7 @@ def front_page(
         cases=cases,
         flights=flights,
         flight_cards=flight_cards[:MOST_FLIGHTS],
-        study_cards=_affordable(study_cards, flight_cards),
+        study_cards=study_cards,
         waiting=[one.study for one in studies if one.state == "not run"],
         learn=learn,
         checkout=checkout,
@@ -454,16 +451,6 @@ def front_page(
     style = read_style("front")
     footer = f"<p>{made}. This page works offline.</p>"
     return page(title="wildlab", body=body, kicker="wildlab", footer=footer, style=style)
-
-
-def _affordable(study_cards: Sequence[Card], flight_cards: Sequence[Card]) -> list[Card]:
-    """The studies' cards, pictures left out once all of them would take too much."""
-    left = MOST_PICTURES - sum(len(one.picture) for one in flight_cards[:MOST_FLIGHTS])
-    kept = []
-    for one in study_cards:
-        left -= len(one.picture)
-        kept.append(one if left >= 0 else one._replace(picture=""))
-    return kept
 
 
 def partners_page(reports: Sequence[str]) -> str:
@@ -564,9 +551,6 @@ def _tiles(studies: Sequence[StudyStatus]) -> list[tuple[str, str]]:
         holding, mostly = (sum(one.verdict == verdict for one in theirs) for verdict in (HOLDS, MOSTLY))
         words = f"claims of the theses hold; {mostly} more on most flights{_waiting(waiting)}"
         tiles.append((f"{holding} / {len(theirs)}", words))
-    if any(study.study.kind == "logged" for study in studies):
-        logged = sum(study.study.kind == "logged" for study in done)
-        tiles.append((str(logged), "done on logged flights"))
     return tiles
 
 

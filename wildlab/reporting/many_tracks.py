@@ -222,32 +222,27 @@ def targets_table(lives: Identities) -> pd.DataFrame:
 
 def tracks_table(followed: ManyTracks, lives: Identities | None) -> pd.DataFrame:
     """A row for each track: when it was shown, of which kind it is, and whether it was on a true target."""
-    rows = []
-    hulls = [hull.name for hull in followed.targets.hulls]
-    spans: dict[int, list[tuple[float, int]]] = {}
-    for scan in followed.shown:
-        for i, identity in enumerate(scan.identity):
-            spans.setdefault(int(identity), []).append((scan.time, int(np.argmax(scan.kinds[i]))))
     start = followed.scans[0].time if followed.scans else 0.0
-    for identity, span in spans.items():
-        times = [time for time, _ in span]
-        kinds = np.bincount([kind for _, kind in span], minlength=len(hulls))
-        row: dict[str, object] = {
-            "track": str(identity),
-            "from": times[0] - start,
-            "to": times[-1] - start,
-            "looks": len(span),
-        }
-        if len(hulls) > 1:
-            row["kind"] = plain(hulls[int(np.argmax(kinds))])
-        if lives is not None:
-            # One that was there only while a true place was not known is not judged.
-            life = lives.tracks.get(identity)
-            row["on"] = 100 * life.on_target / life.scans if life and life.scans else np.nan
-            row["nees"] = life.anees / 2 if life else np.nan
-            row["alone"] = life.anees_alone / 2 if life else np.nan
-        rows.append(row)
-    return pd.DataFrame(rows)
+    hulls = [plain(hull.name) for hull in followed.targets.hulls]
+    shown = pd.DataFrame(
+        [
+            (int(identity), scan.time - start, int(np.argmax(kinds)))
+            for scan in followed.shown
+            for identity, kinds in zip(scan.identity, scan.kinds, strict=True)
+        ],
+        columns=["track", "time", "kind"],
+    )
+    each = shown.groupby("track", sort=False)
+    rows = each["time"].agg(["min", "max", "size"]).set_axis(["from", "to", "looks"], axis=1)
+    if len(hulls) > 1:
+        rows["kind"] = [hulls[one] for one in each["kind"].agg(lambda kinds: kinds.mode()[0])]
+    if lives is not None:
+        # One that was there only while a true place was not known is not judged.
+        of = [lives.tracks.get(one) for one in rows.index]
+        rows["on"] = [100 * one.on_target / one.scans if one and one.scans else np.nan for one in of]
+        rows["nees"] = [one.anees / 2 if one else np.nan for one in of]
+        rows["alone"] = [one.anees_alone / 2 if one else np.nan for one in of]
+    return rows.reset_index().astype({"track": str})
 
 
 # -- what is recorded, and the page

@@ -26,8 +26,6 @@ from typing import Any, NamedTuple
 import cv2
 import numpy as np
 import pandas as pd
-import pyarrow
-import pyarrow.parquet
 
 from wildlab.errors import WildlabError
 from wildlab.files import csv_text, write_atomic
@@ -37,7 +35,7 @@ from wildlab.flight.readers import read_log
 from wildlab.flight.readers.frames.image import MOST_BYTES, SUFFIXES, decode, file_name, images_below
 from wildlab.flight.readers.photos import is_photos, natural_key
 from wildlab.flight.schema import TABLES, conform
-from wildlab.flight.store import accept_changes, load_flight
+from wildlab.flight.store import accept_changes, load_flight, write_table
 from wildlab.paths import DATA
 from wildlab.replay.images import stretch_contrast
 
@@ -46,9 +44,6 @@ MOST_IMAGES, MOST_POINTS, MOST_LETTERS, MOST_TABLE = 200_000, 2000, 60, 50_000_0
 #: No image is wider, px.
 WIDEST = 1e6
 COLUMNS = ("image", "name", "u_px", "v_px")
-# pyarrow carries no types.
-arrow: Any = pyarrow
-parquet: Any = pyarrow.parquet
 
 #: Who says so, in the table of detections.
 SOURCE = "clicks"
@@ -350,25 +345,20 @@ def take_clicks(folder: Path) -> Taken:
     own.insert(0, "detection_id", [f"click-{number:05d}" for number in range(1, len(own) + 1)])
     own["source"], own["kind"] = SOURCE, "pixel"
     joined = own if before is None else _joined(before[before["source"] != SOURCE], own)
-    _write(folder, conform(TABLES["detections"], joined, "detections"))
+    # Everything else in the folder stays, images too.
+    part = folder / ".detections.part"
+    write_table(conform(TABLES["detections"], joined, "detections"), part)
+    part.replace(folder / "detections.parquet")
+    accept_changes(folder)
     return Taken(len(own), own["frame_id"].nunique(), left, replaced)
 
 
 def _joined(before: pd.DataFrame, own: pd.DataFrame) -> pd.DataFrame:
-    """Both tables, each column in its type: what a detection does not have is NaN, or empty text."""
-    columns = list(dict.fromkeys([*before.columns, *own.columns]))
+    """Both tables: what a detection does not have is NaN, or empty text."""
+    joined = pd.concat([before, own], ignore_index=True) if len(before) else own
     texts = {column.name for column in TABLES["detections"].columns if column.dtype == "text"}
-
-    def filled(table: pd.DataFrame) -> pd.DataFrame:
-        whole = {}
-        for name in columns:
-            other = before if name in before else own
-            text = name in texts or other[name].dtype == object
-            nothing = np.full(len(table), "", dtype=object) if text else np.full(len(table), np.nan)
-            whole[name] = table[name].to_numpy() if name in table else nothing
-        return pd.DataFrame(whole)
-
-    return pd.concat([filled(before), filled(own)], ignore_index=True) if len(before) else filled(own)
+    empty = {name: "" for name in joined if name in texts or joined[name].dtype == object}
+    return joined.fillna(empty)
 
 
 def _finder(frames: list[str]) -> Callable[[str], str | None]:
@@ -386,15 +376,6 @@ def _finder(frames: list[str]) -> Callable[[str], str | None]:
         return by_stem[stem] if stems[stem] == 1 else None
 
     return find
-
-
-def _write(folder: Path, table: pd.DataFrame) -> None:
-    """The table in its place, and its checksum: everything else in the folder stays, images too."""
-    sink = arrow.BufferOutputStream()
-    plain = arrow.Table.from_pandas(table, preserve_index=False).replace_schema_metadata(None)
-    parquet.write_table(plain, sink)
-    write_atomic(folder / "detections.parquet", sink.getvalue().to_pybytes())
-    accept_changes(folder)
 
 
 #: Bytes that a page may send at once, and how long it may take for it, s.

@@ -39,11 +39,10 @@ def git_state() -> dict[str, Any]:
 
     Where there is no checkout, the version alone says what the code was.
     """
-    if ROOT is None:
-        return {"commit": None, "dirty": None, "note": "installed from a wheel"}
+    nothing = {"commit": None, "dirty": None, "note": "not a git checkout"}
     git = shutil.which("git")
-    if git is None:
-        return {"commit": None, "dirty": None, "note": "git is not installed"}
+    if ROOT is None or git is None:
+        return nothing | {"note": "git is not installed" if ROOT else "installed from a wheel"}
 
     def ask(*arguments: str) -> str:
         return subprocess.run(  # noqa: S603 - a fixed program, found above, with fixed arguments
@@ -61,10 +60,10 @@ def git_state() -> dict[str, Any]:
         # A copy without its history may lie inside somebody else's repository, whose commit says nothing
         # about it.
         if top != ROOT.resolve():
-            return {"commit": None, "dirty": None, "note": "not a git checkout"}
+            return nothing
         return {"commit": ask("rev-parse", "HEAD"), "dirty": bool(ask("status", "--porcelain")), "note": ""}
     except (subprocess.SubprocessError, OSError):
-        return {"commit": None, "dirty": None, "note": "not a git checkout"}
+        return nothing
 
 
 def collect(

@@ -5,19 +5,19 @@ A run works in a folder beside its report's. Only when it is over are the files 
 trusted. A failed run leaves a page that says so; a run that is broken off (Ctrl-C) leaves the former report
 as it was.
 
-A run of all studies goes twice over them. The first pass leaves first looks, pages from a few flights each,
-the quick studies first; the second puts the full numbers in their place, page by page, and computes no flight
-again that the first one had. Whenever it is broken off, every page that is there says what it shows.
+A first look is a page from a few flights; the full numbers take its place, and no flight is computed again
+that it had. Of all studies those are left alone whose full reports are there, from the same code, data and
+parameters; whenever it is broken off, every page that is there says what it shows.
 """
 
 from __future__ import annotations
 
 import os
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from rich.console import Console
 
@@ -38,7 +38,7 @@ from wildlab.runner.job import Job, other_reports, typed_in_report
 from wildlab.runner.ledger import build_ledger
 from wildlab.runner.progress import outcome_line, pass_line, shown
 from wildlab.runner.scheduling import Listener, Outcome, run_jobs
-from wildlab.runner.seeds import SeedWork, code_key, make_work, missing_seeds, page_key
+from wildlab.runner.seeds import SeedWork, code_key, make_work, page_key
 from wildlab.runner.status import read_status
 
 #: Guessed seconds of a study that has not been run here yet. Only their order matters.
@@ -174,13 +174,13 @@ def run_studies(
     Parameters
     ----------
     everything
-        Run all studies, the quick ones first, and twice: a first look at each, then the full numbers (see
-        `plan_passes`). One whose public data are not here is skipped, and says so; asked for by
-        name, it is an error. One that is kept apart is left out.
+        Run all studies, the quick ones first, but for those whose full report is there. One whose public
+        data are not here is skipped, and says so; asked for by name, it is an error. One that is kept apart
+        is left out.
     first_look
         Take the first look alone, at all studies or those named.
     seeds
-        Over how many simulated flights, in place of each study's own number; then there is one pass.
+        Over how many simulated flights, in place of each study's own number.
     flight
         A flight folder for the one study named, in place of its own; its report is then named
         ``<study>-<flight>``.
@@ -242,18 +242,19 @@ def run_studies(
             first_look=few,
         )
 
-    passes = [[job(study) for study in ready]]
-    if first_look or (everything and seeds is None):
-        looks = {look.name: look for study in ready if (look := job(study, few=True)).first_look}
-        planned = plan_passes(passes[0], looks)
-        passes = [planned.first] if first_look else [planned.first, planned.second]
-        skipped += planned.kept if first_look else []
+    jobs = []
+    for study in ready:
+        whole = job(study)
+        if (everything or first_look) and has_whole_report(whole):
+            skipped.append(Outcome(whole.name, "skipped", 0.0, THERE, Path(whole.reports) / whole.name))
+        else:
+            jobs.append(job(study, few=True) if first_look else whole)
     notes = _notes(chosen, seeds, scheduler)
     apart = [study.name for study in studies.values() if study.apart]
     if everything and apart:
         notes.append(f"Not among all, to be run by name: {', '.join(apart)}.")
     return run_all(
-        passes, skipped, studies, reports, console, notes=notes, parallel=parallel, scheduler=scheduler
+        [jobs], skipped, studies, reports, console, notes=notes, parallel=parallel, scheduler=scheduler
     )
 
 
@@ -326,43 +327,6 @@ def _absent_data(study: StudyEntry) -> WildlabError | None:
     except WildlabError as error:
         return error
     return None
-
-
-class Passes(NamedTuple):
-    """What each pass runs, and what the first one leaves alone."""
-
-    first: list[Job]
-    second: list[Job]
-    kept: list[Outcome]
-
-
-def plan_passes(whole: Sequence[Job], looks: Mapping[str, Job]) -> Passes:
-    """Which jobs go into which pass.
-
-    A study whose full numbers cost no more than a first look is run once, in full, in the first pass: one
-    without anything to take less of, and one all of whose seeds are there. A full report from the same code,
-    data and parameters is not replaced by a first look.
-
-    Parameters
-    ----------
-    whole
-        The full jobs, in the order in which they are to be run.
-    looks
-        The jobs of first looks by name; of some studies there is none.
-    """
-    first, second, kept = [], [], []
-    for job in whole:
-        look = looks.get(job.name)
-        seeded = set(look.first_look) == {"seeds"} if look else False
-        if look is None or (seeded and job.seeds is not None and not missing_seeds(job.seeds)):
-            first.append(job)
-            continue
-        second.append(job)
-        if has_whole_report(job):
-            kept.append(Outcome(job.name, "skipped", 0.0, THERE, Path(job.reports) / job.name))
-        else:
-            first.append(look)
-    return Passes(first, second, kept)
 
 
 def has_whole_report(job: Job) -> bool:

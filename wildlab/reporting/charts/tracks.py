@@ -44,6 +44,7 @@ from wildlab.reporting.charts.drawing import (
     draw_platform,
     draw_way,
     finish,
+    fit_map,
     mark_place,
     name_rows,
     new_strips,
@@ -464,10 +465,9 @@ def map_shown(
         )
     if shown:
         every = np.concatenate([*shown, *platforms.values()])
-        low, high = np.nanmin(every, axis=0), np.nanmax(every, axis=0)
-        margin = MARGIN * np.maximum(high - low, 10.0)
-        (bottom, left), (top, right) = low - margin, high + margin
-        ax.set(xlim=(left, right), ylim=(bottom, top))
+        every = every[np.isfinite(every).all(axis=1)]
+        if len(every):
+            fit_map(ax, every, MARGIN * max(float(np.ptp(every, axis=0).max()), 10.0))
     map_axes(ax)
     finish(fig)
     return captioned(fig, "tracking", "map", slug("map", target), target=target, filter=filter_words(name))
