@@ -610,59 +610,6 @@ def best_goal(
     """
     worth = utilities(positions, covariances, platform, way_point, alpha=alpha, c=c)
     if worth.max() == -np.inf:
-        raise WildlabError("there is no goal left", "end the search when all is done (all_positioned)")
+        raise WildlabError("there is no goal left", "end the search when all is done")
     k = int(np.argmax(worth))
     return SEARCH if k == len(worth) - 1 else k
-
-
-def all_positioned(known: ArrayLike, live: ArrayLike) -> Mask:
-    """Which enclosures are done: as many animals are known at once as live there, F 5.3.
-
-    Parameters
-    ----------
-    known
-        (E,) animals with an estimate that is not lost.
-    live
-        (E,) that live there, which F takes as known.
-
-    Returns
-    -------
-    (E,) bool; the search ends where all are.
-    """
-    return np.asarray(np.asarray(known) >= np.asarray(live))
-
-
-def lost_by_covariance(covariances: ArrayLike, limit: float) -> Mask:
-    """Which animals are lost because too little is known of them, F 5.3: Tr(P) beyond a limit.
-
-    Parameters
-    ----------
-    covariances
-        (m, 2, 2) m^2.
-    limit
-        Of the trace, m^2; F prints none.
-
-    Returns
-    -------
-    (m,) bool.
-    """
-    P = np.asarray(covariances, float).reshape(-1, 2, 2)
-    return np.asarray(np.trace(P, axis1=1, axis2=2) > limit)
-
-
-def lost_by_search(missed: ArrayLike, doubt: float) -> Mask:
-    """Which animals are lost because they were not where they should be, F 5.3.4.
-
-    Parameters
-    ----------
-    missed
-        (m,) probability that all images of the estimated position and what lies about it would have missed an
-        animal that is there: the product of 1 - P_D (5.8) since it was last found.
-    doubt
-        Below this one no longer believes in it.
-
-    Returns
-    -------
-    (m,) bool.
-    """
-    return np.asarray(np.asarray(missed, float) < doubt)
