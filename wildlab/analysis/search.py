@@ -16,7 +16,7 @@ import numpy as np
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array, Indices, Mask
 from wildlab.geometry.georeference import Terrain
-from wildlab.geometry.viewsheds import lines_clear
+from wildlab.geometry.viewsheds import in_field_of_view, lines_clear
 from wildlab.planning.legs import Flying, Leg, PatternPlanner, Platform, RandomWalk, SearchSensor
 from wildlab.planning.patterns import contains, grid_points, lawn_mower
 from wildlab.planning.planner import (
@@ -24,7 +24,6 @@ from wildlab.planning.planner import (
     InformationPlanner,
     best_goal,
     detection_probability,
-    in_field_of_view,
 )
 
 
@@ -317,7 +316,8 @@ def found_in(world: World, leg: Leg, rows: Indices, sensor: SearchSensor) -> Mas
         likely = world.chance[row] < np.exp(-away / sensor.reach**2)
         if likely.any():
             inside = np.flatnonzero(likely)
-            inside = inside[in_field_of_view(at[inside], p, leg.R_nc[min(image, len(leg.R_nc) - 1)], sensor)]
+            R_nc = leg.R_nc[min(image, len(leg.R_nc) - 1)]
+            inside = inside[in_field_of_view(sensor.halves, at[inside], p, R_nc)]
             hit[image, inside] = lines_clear(world.terrain, at[inside], p) if len(inside) else True
     return hit
 

@@ -27,7 +27,7 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.compilation import compiled
 from wildlab.geometry.frames import Array, Indices, Mask
 from wildlab.geometry.georeference import Terrain
-from wildlab.geometry.viewsheds import lines_clear
+from wildlab.geometry.viewsheds import in_field_of_view, lines_clear
 from wildlab.planning.legs import (
     Flying,
     Leg,
@@ -230,29 +230,6 @@ def grow_old_all(Y: Any, left: Any, q: float) -> None:
         left[i] = inverse_trace(y[0, 0], y[0, 1], m0, y[1, 1], m1, y[2, 2])
 
 
-def in_field_of_view(points: ArrayLike, p_nc: ArrayLike, R_nc: ArrayLike, sensor: SearchSensor) -> Mask:
-    """Which points lie in the field of view, F (2.22)-(2.23); what hides them is not asked.
-
-    Parameters
-    ----------
-    points
-        (N, 3) in n, m.
-    p_nc
-        Of the camera, (3,), m.
-    R_nc
-        (3, 3), takes a vector from c (z out of the lens) to n.
-    sensor
-        Its half angles are used.
-
-    Returns
-    -------
-    (N,) bool.
-    """
-    x, y, z = ((np.asarray(points, float) - np.asarray(p_nc, float)) @ np.asarray(R_nc, float)).T
-    inside = (np.abs(x) <= sensor.half_width * z) & (np.abs(y) <= sensor.half_height * z)
-    return np.asarray(inside & (z > 0))
-
-
 def detection_probability(
     points: ArrayLike,
     p_nc: ArrayLike,
@@ -279,13 +256,13 @@ def detection_probability(
     Examples
     --------
     >>> down = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    >>> sensor = SearchSensor(0.3, 0.2, sd=0.01, reach=100.0)
+    >>> sensor = SearchSensor((0.3, 0.2), sd=0.01, reach=100.0)
     >>> ground = [[0.0, 0.0, 0.0], [0.0, 80.0, 0.0]]
     >>> print(np.round(detection_probability(ground, [0.0, 0.0, -50.0], down, sensor), 2))
     [0.78 0.  ]
     """
     away = np.asarray(points, float) - np.asarray(p_nc, float)
-    seen = in_field_of_view(points, p_nc, R_nc, sensor)
+    seen = in_field_of_view(sensor.halves, points, p_nc, R_nc)
     return np.where(seen, np.exp(-(away**2).sum(axis=-1) / sensor.reach**2), 0.0)
 
 
@@ -399,7 +376,7 @@ class InformationPlanner:
         each = np.bincount(self._block)
         sums = [np.bincount(self._block, self.points[:, axis]) for axis in (0, 1)]
         self._middles = np.stack(sums, axis=-1) / each[:, None]
-        self._half = np.array([sensor.half_width, sensor.half_height])
+        self._half = np.array(sensor.halves)
 
     def add(self, leg: Leg, clear: Mask | None = None) -> None:
         """Add what the images of a leg tell, F (5.10).

@@ -17,7 +17,6 @@ from wildlab.analysis.navigate import (
     PUBLISHED_LIKE,
     REFERENCES,
     SETTLING_S,
-    VELOCITY,
     MekfTuning,
     Navigated,
     NavigationErrors,
@@ -39,6 +38,7 @@ from wildlab.evaluation.consistency import (
     white_bound,
 )
 from wildlab.flight.clocks import frame_times
+from wildlab.flight.schema import VELOCITY
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
 from wildlab.messages.catalogue import Message, load_texts
