@@ -110,6 +110,7 @@ def test_times_are_those_of_a_square_that_moves():
     for k, one in enumerate(seen):
         if len(one):
             assert shown.last[k, column] == one[-1]
+            assert shown.revisit_age[k, column] == 60 - one[-1]
         else:
             assert np.isnan(shown.last[k, column])
     assert not shown.looks[:, 50 + 11].any() and shown.looks[:, 50 + 10].any()

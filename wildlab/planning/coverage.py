@@ -56,6 +56,11 @@ class Coverage(NamedTuple):
         """(R, C) bool: seen sharply at least once."""
         return np.asarray(self.looks > 0)
 
+    @property
+    def revisit_age(self) -> Array:
+        """(R, C) how long ago a node was last seen when the last image was taken, s; NaN where never."""
+        return np.asarray(self.duration - self.last)
+
 
 def from_sightings(
     found: Sightings, terrain: Terrain, times: Array, sharp: Mask, range_scale: float = np.inf
