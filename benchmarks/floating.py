@@ -13,9 +13,8 @@ from wildlab.detection.floating import FloatingThresholds, find_edges, find_obje
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses, Mount
 from wildlab.geometry.frames import euler_to_matrix
-from wildlab.simulation.scene.bodies import vessel
 from wildlab.simulation.scene.flights import CameraResponse, expose, sensor_of
-from wildlab.simulation.scene.render import Scene, Sea, render
+from wildlab.simulation.scene.render import Scene, Sea, render, vessel
 
 #: Images a second that are wanted of the search, and scenes a second of the rendering.
 SEARCHED, RENDERED = 250.0, 4.0

@@ -141,13 +141,29 @@ def test_negative_information_moves_a_track_out_of_what_was_seen():
     assert mean[0, 1] == pytest.approx(np.sqrt(2 / np.pi) * np.sqrt(25.25) * 9 / 11, rel=0.2)
 
 
+class Scripted:
+    """A tracker with these traces before and after an image, to whose detections it gives these tracks."""
+
+    def __init__(self, names: list[int], *traces: dict[int, float]) -> None:
+        self.names, self.traces = np.array(names), list(traces)
+
+    def step(self, scan: ImageScan) -> np.ndarray:
+        self.now = self.traces.pop(0)
+        return self.names
+
+    def known(self) -> tuple[np.ndarray, Array, Array]:
+        covariances = np.reshape(list(self.now.values()), (-1, 1, 1)) / 2 * np.eye(2)
+        return np.array(list(self.now), np.int64), np.zeros((len(self.now), 2)), covariances
+
+
 def test_a_ledger_knows_who_got_which_track_and_takes_a_false_detection_for_no_animal():
     ledger = Ledger(3)
-    ledger.enter(0, 0.0, np.arange(3), np.array([1, 2, 3]), {}, {1: 4.0, 2: 6.0, 3: 8.0})
+    ledger.take(0, Scripted([1, 2, 3], {}, {1: 4.0, 2: 6.0, 3: 8.0}), blind(0.0), np.arange(3))
     for image, time in ((1, 10.0), (2, 50.0)):
-        ledger.enter(image, time, np.array([-1]), np.array([4]), {3: 8.0}, {3: 8.0, 4: 9.0})
+        ledger.take(image, Scripted([4], {3: 8.0}, {3: 8.0, 4: 9.0}), blind(time), np.array([-1]))
     before = {1: 50.0, 2: 60.0, 3: 7.0}
-    ledger.enter(9, 90.0, np.array([1, 2, 0]), np.array([1, 3, 0]), before, {1: 5.0, 2: 60.0, 3: 4.0})
+    tracker = Scripted([1, 3, 0], before, {1: 5.0, 2: 60.0, 3: 4.0})
+    ledger.take(9, tracker, blind(90.0), np.array([1, 2, 0]))
     first, _, _, false, again, third, last = ledger.found
     assert first.away == np.inf and first.own == 0 and np.isnan(first.before)
     assert (third.animal, third.track, third.own, third.away) == (1, 1, 2, 90.0)

@@ -11,13 +11,13 @@ from tests.analysis.conftest import first_seconds
 from wildlab.analysis.navigate import (
     AXES,
     PUBLISHED_LIKE,
-    VELOCITY,
     comparison_times,
     errors_against,
     navigate_mekf,
     summarise,
 )
 from wildlab.flight.clocks import covariance_columns
+from wildlab.flight.schema import QUATERNION, VELOCITY
 from wildlab.flight.store import Flight
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.twins import simulate
@@ -55,9 +55,9 @@ def test_errors_are_truth_less_estimate_in_the_estimated_body(pair):
     assert np.abs(found.error[:, :6] - error[:, :6]).max() < 1e-9
     # Four times the modified Rodrigues parameters are the rotation vector but for its third power.
     assert np.abs(found.error[:, 6:] - error[:, 6:]).max() < 2e-5
-    q = Rotation.from_quat(estimate[["q_w", "q_x", "q_y", "q_z"]].to_numpy(), scalar_first=True)
+    q = Rotation.from_quat(estimate[QUATERNION].to_numpy(), scalar_first=True)
     back = q * Rotation.from_mrp(found.error[:, 6:] / 4)
-    true = Rotation.from_quat(truth[["q_w", "q_x", "q_y", "q_z"]].to_numpy(), scalar_first=True)
+    true = Rotation.from_quat(truth[QUATERNION].to_numpy(), scalar_first=True)
     assert (back.inv() * true).magnitude().max() < 1e-9
     assert np.isnan(found.sd).all()
     assert all(np.isnan(values).all() for values in found.nees.values())

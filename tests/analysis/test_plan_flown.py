@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wildlab.analysis.plan_coverage import ExecutionErrors, Looks, with_errors
+from wildlab.analysis.plan_coverage import ExecutionErrors, Looks, displaced, drawn_errors
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import matrix_to_rotation_vector
 from wildlab.geometry.georeference import Terrain
@@ -32,7 +32,9 @@ def test_errors_have_their_size_and_last():
     _, headings, poses = flown()
     off, turned = [], []
     for seed in range(150):
-        real = with_errors(poses, headings, ERRORS, 0.5, np.random.default_rng(seed))
+        real = displaced(
+            poses, headings, *drawn_errors(len(headings), ERRORS, 0.5, np.random.default_rng(seed))
+        )
         off.append((real.p_nc - poses.p_nc)[:2])
         between = real.R_nc @ np.swapaxes(poses.R_nc, -1, -2)
         turned.append(matrix_to_rotation_vector(between)[0])

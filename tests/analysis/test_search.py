@@ -20,7 +20,7 @@ from wildlab.analysis.search import (
 from wildlab.planning.legs import Flying, Leg, Platform, SearchSensor, look_attitude
 from wildlab.planning.planner import SEARCH
 
-SENSOR = SearchSensor(0.3, 0.2, sd=0.2, reach=100.0, nearest=5.0)
+SENSOR = SearchSensor((0.3, 0.2), sd=0.2, reach=100.0, nearest=5.0)
 FLYING = Flying(5.0, 50.0)
 AREAS = (
     np.array([[0.0, 0.0], [60.0, 0.0], [60.0, 60.0], [0.0, 60.0]]),

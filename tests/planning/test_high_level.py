@@ -6,7 +6,6 @@ import pytest
 from tests.refused import refused
 from wildlab.planning.planner import (
     SEARCH,
-    all_positioned,
     best_goal,
     utilities,
 )
@@ -27,7 +26,3 @@ def test_the_greatest_utility_is_the_goal():
     assert best_goal(at, P, [0, 45], [0, 10], alpha=1, c=1) == 0
     with refused("no goal"):
         best_goal(np.zeros((0, 2)), np.zeros((0, 2, 2)), [0, 0], None, alpha=1, c=1)
-
-
-def test_an_enclosure_is_done_when_all_are_known_at_once():
-    assert all_positioned([5, 4, 0], [5, 5, 0]).tolist() == [True, False, True]

@@ -11,10 +11,11 @@ from tests.planning.ground import bearing_information, bearing_jacobian
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import R_MC_DOWN
 from wildlab.geometry.frames import wrap
+from wildlab.geometry.viewsheds import field_of_view, in_field_of_view
 from wildlab.planning.legs import SearchSensor
-from wildlab.planning.planner import in_field_of_view, inverse_traces
+from wildlab.planning.planner import inverse_traces
 
-SENSOR = SearchSensor(0.3, 0.2, sd=0.02, reach=100.0, nearest=1e-6)
+SENSOR = SearchSensor((0.3, 0.2), sd=0.02, reach=100.0, nearest=1e-6)
 coordinate = st.floats(-300, 300)
 point = st.tuples(coordinate, coordinate, st.floats(-50, 50)).filter(lambda p: np.hypot(p[0], p[1]) > 1.0)
 camera_at = np.array([0.0, 0.0, -80.0])
@@ -48,7 +49,7 @@ def test_the_jacobian_is_the_numerical_derivative(p):
 def test_straight_below_the_azimuth_tells_no_more_than_from_nearest():
     below = np.array([[0.0, 0.0, 0.0]])
     assert np.isnan(bearing_jacobian(below, camera_at)).any()
-    sensor = SearchSensor(0.3, 0.2, sd=0.02, reach=100.0, nearest=5.0)
+    sensor = SearchSensor((0.3, 0.2), sd=0.02, reach=100.0, nearest=5.0)
     Y = bearing_information(below, camera_at, sensor)[0]
     assert np.diag(Y) == pytest.approx([1 / (0.02 * 80) ** 2, 1 / (0.02 * 5) ** 2, 0])
     beside = bearing_information([[5.0, 0.0, 0.0]], camera_at, sensor)[0]
@@ -58,16 +59,16 @@ def test_straight_below_the_azimuth_tells_no_more_than_from_nearest():
 
 def test_the_field_of_view_is_that_of_a_camera_without_distortion():
     camera = Camera(720, 480, 1267.0, 1117.0, 360.0, 240.0)
-    sensor = SearchSensor(camera.width / 2 / camera.fx, camera.height / 2 / camera.fy, 0.01, 100.0, 1.0)
+    halves = field_of_view(camera)
     rng = np.random.default_rng(2)
     points = rng.uniform(-60, 60, (400, 3)) * [1, 1, 0.1]
     x, y, z = ((points - camera_at) @ R_MC_DOWN).T
     u, v = 360 + 1267 * x / z, 240 + 1117 * y / z
     inside = (u >= 0) & (u <= 720) & (v >= 0) & (v <= 480)
     assert 20 < inside.sum() < 380
-    assert (in_field_of_view(points, camera_at, R_MC_DOWN, sensor) == inside).all()
+    assert (in_field_of_view(halves, points, camera_at, R_MC_DOWN) == inside).all()
     behind = points * [1, 1, 0] - [0, 0, 160]
-    assert not in_field_of_view(behind, camera_at, R_MC_DOWN, sensor).any()
+    assert not in_field_of_view(halves, behind, camera_at, R_MC_DOWN).any()
 
 
 def test_the_trace_of_the_inverse_by_plain_inverses():

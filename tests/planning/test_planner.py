@@ -27,7 +27,7 @@ from wildlab.planning.planner import (
     inverse_traces,
 )
 
-SENSOR = SearchSensor(0.3, 0.2, sd=0.2, reach=80.0, nearest=5.0)
+SENSOR = SearchSensor((0.3, 0.2), sd=0.2, reach=80.0, nearest=5.0)
 FLYING = Flying(5.0, 50.0)
 DOWN = Platform(np.zeros(2), 0.0, look_attitude(0.0, 0.0, 0.0))
 

@@ -331,3 +331,10 @@ def test_sensors_of_a_ferry_judged_on_one_scenario(reports, tmp_path, shared_dat
     assert {sum(one["value"] for one in counts)} == {one["n"] for one in counts}
     assert (folder / "figures" / "map-scenario-17.png").is_file()
     assert faults(folder / "report.html") == []
+
+
+def test_all_boats_followed_on_one_scenario(reports, tmp_path, shared_data, faults):
+    flight = imported(tmp_path, "autoferry-17", shared_data("tracking", "autoferry"))
+    folder = run("autoferry-many", reports, flight=flight, first_look=True)
+    assert (folder / "figures" / "wrong.png").is_file()
+    assert faults(folder / "report.html") == []

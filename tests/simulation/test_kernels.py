@@ -22,7 +22,7 @@ def check_sum_of_sines(seed: int, times: np.ndarray, within: float) -> None:
     found = Disturbance(a, w, phase)
     for derivative in range(3):
         np.testing.assert_allclose(found.with_derivatives(times)[derivative], expected[derivative], 0, within)
-        np.testing.assert_allclose(found(times, derivative), expected[derivative], 0, within)
+    np.testing.assert_allclose(found(times), expected[0], 0, within)
 
 
 @given(st.integers(0, 999), st.floats(0, 5000), st.floats(1e-4, 1.0), st.integers(0, 400))

@@ -65,7 +65,7 @@ def test_a_world_is_the_twins_kind_and_the_same_for_its_seed():
     scene, again = draw_scene(5, "uav-search"), draw_scene(5, "uav-search")
     assert (scene.world.animals == again.world.animals).all() and (scene.grid == again.grid).all()
     assert scene.flying.height == 60 and scene.flying.speed == 5
-    assert scene.sensor.half_width == pytest.approx(360 / 1267)
+    assert scene.sensor.halves[0] == pytest.approx(360 / 1267)
     for number, area in enumerate(scene.world.areas):
         inside = scene.world.animals[:, scene.world.area_of == number, :2]
         low, high = area.min(axis=0) - 1e-6, area.max(axis=0) + 1e-6

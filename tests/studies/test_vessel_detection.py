@@ -11,9 +11,8 @@ from wildlab.evaluation.shares import FAILS, HOLDS, UNDECIDED, decide_check
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import R_MC_DOWN
 from wildlab.reporting.published import load_claims, load_published
-from wildlab.simulation.scene.bodies import rectangle
 from wildlab.simulation.scene.flights import IDEAL, expose, sensor_of
-from wildlab.simulation.scene.render import EVEN, Scene, render
+from wildlab.simulation.scene.render import EVEN, Scene, rectangle, render
 from wildlab.studies.rules import load_rules
 from wildlab.studies.vessel_detection import (
     BOATS,

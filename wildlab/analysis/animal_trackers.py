@@ -30,7 +30,7 @@ from wildlab.geometry.covariances import gate_threshold
 from wildlab.geometry.frames import Array, Indices, Mask
 from wildlab.geometry.georeference import Terrain
 from wildlab.planning.gimbal import GimbalAngles, camera_on_course
-from wildlab.planning.planner import SEARCH, all_positioned, best_goal
+from wildlab.planning.planner import SEARCH, best_goal
 from wildlab.tracking.association import global_nearest
 from wildlab.tracking.kalman import update
 from wildlab.tracking.motion import Motion
@@ -365,19 +365,8 @@ class Ledger:
         # First on to the image alone: a trace before it is one at its time.
         tracker.step(blind(scan.time))
         before = traces_of(tracker)
-        names = tracker.step(scan)
-        self.enter(image, scan.time, animals, names, before, traces_of(tracker))
-
-    def enter(
-        self,
-        image: int,
-        time: float,
-        animals: Indices,
-        names: NDArray[np.int64],
-        before: dict[int, float],
-        after: dict[int, float],
-    ) -> None:
-        """The detections of one image; traces of all tracks before and after it, by their number."""
+        names, time = tracker.step(scan), scan.time
+        after = traces_of(tracker)
         own = np.append(self._own, 0)  # the last row is that of no animal
         for animal, name in zip(animals.tolist(), names.tolist(), strict=True):
             if not name:
@@ -605,7 +594,7 @@ def patrol(
         identity, mean, P = tracker.known()
         here_live, home = ~tracker.lost, tracker.home
         counts = np.bincount(home[here_live & (home >= 0)], minlength=len(lives))[: len(lives)]
-        done[np.isinf(done) & all_positioned(counts, lives)] = time
+        done[np.isinf(done) & (counts >= lives)] = time
         while reached < len(way_points) and np.isfinite(done[area_of[reached]]):
             reached += 1
         if reached == len(way_points):

@@ -19,6 +19,7 @@ from wildlab.errors import WildlabError
 from wildlab.evaluation.intervals import time_blocks
 from wildlab.files import write_atomic, write_csv
 from wildlab.flight.clocks import between, frame_times, gimbal_angles, pose_finder, poses_at, truth_at
+from wildlab.flight.schema import POSITION
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.corrections import Calibration, PosesAt, calibrated_poses
@@ -432,7 +433,7 @@ def write_points(flight: Flight, points: pd.DataFrame, path: Path, source: str =
     counted = ELLIPSOID if reference == "ellipsoid" else f"height above {reference}"
     table = _described(flight, points, counted, source)
     placed = table[table["north_m"].notna() & table["down_m"].notna()]
-    degrees = _degrees(flight, placed[["north_m", "east_m", "down_m"]].to_numpy(float))
+    degrees = _degrees(flight, placed[POSITION].to_numpy(float))
     places: list[object] = [[*row[:2].round(8).tolist(), round(float(row[2]), 3)] for row in degrees]
     known = placed[placed["long_90_m"].notna() & placed["short_90_m"].notna()]
     rings = [[_degrees(flight, one)[:, :2].round(8).tolist()] for one in _rings(known)]
@@ -488,7 +489,7 @@ def _rings(placed: pd.DataFrame) -> Array:
     bearing = np.radians(placed["bearing_deg"].to_numpy(float))[:, None]
     north = along * np.cos(bearing) - across * np.sin(bearing)
     east = along * np.sin(bearing) + across * np.cos(bearing)
-    middle = placed[["north_m", "east_m", "down_m"]].to_numpy(float)[:, None, :]
+    middle = placed[POSITION].to_numpy(float)[:, None, :]
     return middle + np.stack([north, east, np.zeros_like(north)], axis=2)
 
 

@@ -15,7 +15,7 @@ from wildlab.evaluation.consistency import (
 )
 from wildlab.flight.checks.inertial import FLYING
 from wildlab.flight.clocks import covariance_columns, covariances, frame_times, gnss_times, poses_at
-from wildlab.flight.schema import LEVER_COLUMNS, SECOND_COLUMNS
+from wildlab.flight.schema import FIELD, LEVER_COLUMNS, POSITION, QUATERNION, SECOND_COLUMNS, VELOCITY
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array, local_earth
 from wildlab.navigation.aiding import Aiding, earth_field, hard_iron, positions, share_turned, velocities
@@ -30,9 +30,6 @@ from wildlab.navigation.observer import (
 )
 from wildlab.navigation.strapdown import AxisErrors, ImuNoise, ImuSamples, with_turn_on
 
-POSITION = ["north_m", "east_m", "down_m"]
-VELOCITY = ["v_north_m_s", "v_east_m_s", "v_down_m_s"]
-FIELD = ("field_x_ut", "field_y_ut", "field_z_ut")
 #: Share of the magnetic field's turning that gyros in the same axes explain at least; it is nearer one.
 TURNED = 0.6
 #: How much wider than the fixes behind it the heading at the start is taken to be.
@@ -264,7 +261,7 @@ def _field(flight: Flight) -> tuple[Array, Array]:
         Where the field does not turn as the gyros say: its axes are not those of the inertial samples.
     """
     table, gnss = flight.table("magnetometer"), flight.table("gnss")
-    times, field = table["time_s"].to_numpy(float), table[list(FIELD)].to_numpy(float)
+    times, field = table["time_s"].to_numpy(float), table[FIELD].to_numpy(float)
     flown = np.full(len(times), True)
     if set(VELOCITY) <= set(gnss.columns):
         t, v = gnss_times(flight), gnss[VELOCITY].to_numpy(float)
@@ -467,7 +464,7 @@ def _wanted(flight: Flight, times: ArrayLike | None) -> Array:
 
 
 def _nav_table(times: Array, p: Array, v: Array, q: Array) -> pd.DataFrame:
-    columns = ["time_s", *POSITION, *VELOCITY, "q_w", "q_x", "q_y", "q_z"]
+    columns = ["time_s", *POSITION, *VELOCITY, *QUATERNION]
     return pd.DataFrame(np.column_stack([times, p, v, q]), columns=columns)
 
 

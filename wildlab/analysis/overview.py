@@ -19,6 +19,7 @@ from wildlab.errors import WildlabError
 from wildlab.evaluation.streams import FINE, HARMFUL, Pace, pace_of, runs_of, vibration_of
 from wildlab.flight.checks.check import Finding, Use, find, usable_for
 from wildlab.flight.clocks import frame_poses, frame_times, gimbal_angles, gnss_times, longest_gap
+from wildlab.flight.schema import POSITION, QUATERNION, VELOCITY
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array, Mask, matrix_to_euler, quaternion_to_matrix
 from wildlab.geometry.georeference import georeference_pixels, pixel_rays, pixels_to_terrain
@@ -181,9 +182,6 @@ def _closed(outlines: Array) -> Array:
     return np.concatenate([outlines, outlines[:, :1]], axis=1)
 
 
-POSITION = ["north_m", "east_m", "down_m"]
-
-
 class Gain(NamedTuple):
     """One thing to fix.
 
@@ -332,8 +330,6 @@ def _untrue(flight: Flight) -> list[Gain]:
     return []
 
 
-QUATERNION = ["q_w", "q_x", "q_y", "q_z"]
-VELOCITY = ["v_north_m_s", "v_east_m_s", "v_down_m_s"]
 #: A step between poses that is off by so many usual differences, and so many metres, from what their speeds
 #: make of it; without speeds, from the steps before and after it.
 JUMP, JUMP_M = 8.0, 3.0

@@ -362,32 +362,6 @@ class ExecutionErrors(NamedTuple):
     attitude_time: float
 
 
-def with_errors(
-    poses: CameraPoses, headings: ArrayLike, errors: ExecutionErrors, step: float, rng: np.random.Generator
-) -> CameraPoses:
-    """Where the camera really is on a flight of the plan.
-
-    Parameters
-    ----------
-    poses
-        As planned, N rows.
-    headings
-        (N,) of the platform, radians.
-    errors
-        Their size.
-    step
-        Between two rows, s.
-    rng
-        Random numbers.
-
-    Returns
-    -------
-    CameraPoses
-    """
-    off, turn = drawn_errors(poses.rows[0], errors, step, rng)
-    return displaced(poses, headings, off, turn)
-
-
 def drawn_errors(
     count: int, errors: ExecutionErrors, step: float, rng: np.random.Generator
 ) -> tuple[Array, Array]:

@@ -16,18 +16,14 @@ import numpy as np
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array, Indices, Mask
 from wildlab.geometry.georeference import Terrain
-from wildlab.geometry.viewsheds import lines_clear
+from wildlab.geometry.viewsheds import in_field_of_view, lines_clear
 from wildlab.planning.legs import Flying, Leg, PatternPlanner, Platform, RandomWalk, SearchSensor
 from wildlab.planning.patterns import contains, grid_points, lawn_mower
 from wildlab.planning.planner import (
     SEARCH,
     InformationPlanner,
-    all_positioned,
     best_goal,
     detection_probability,
-    in_field_of_view,
-    lost_by_covariance,
-    lost_by_search,
 )
 
 
@@ -142,7 +138,7 @@ def survey(
     while clock + flying.step <= images * flying.interval:
         count = np.bincount(world.area_of[filters.live], minlength=len(world.areas))
         # An enclosure whose animals were all known at once is scanned, and stays so (F 5.3).
-        done |= all_positioned(count, lives)
+        done |= count >= lives
         if done.all():
             positioned = clock
             break
@@ -158,8 +154,9 @@ def survey(
             seen = np.flatnonzero(shown)
             at = world.animals[window[image], seen, :2]
             filters.see(seen, at + rng.normal(0.0, rules.position_sd, at.shape))
-        by_covariance = filters.live & wanted & lost_by_covariance(filters.P, rules.limit)
-        by_search = filters.live & wanted & lost_by_search(filters.missed, rules.doubt) & ~by_covariance
+        # Too little is known of them, or they were not where they should be (F 5.3, 5.3.4).
+        by_covariance = filters.live & wanted & (2 * filters.p > rules.limit)
+        by_search = filters.live & wanted & (filters.missed < rules.doubt) & ~by_covariance
         lost += (by_covariance.sum(), by_search.sum())
         filters.live &= ~(by_covariance | by_search)
         filters.missed[~filters.live] = 1.0
@@ -319,7 +316,8 @@ def found_in(world: World, leg: Leg, rows: Indices, sensor: SearchSensor) -> Mas
         likely = world.chance[row] < np.exp(-away / sensor.reach**2)
         if likely.any():
             inside = np.flatnonzero(likely)
-            inside = inside[in_field_of_view(at[inside], p, leg.R_nc[min(image, len(leg.R_nc) - 1)], sensor)]
+            R_nc = leg.R_nc[min(image, len(leg.R_nc) - 1)]
+            inside = inside[in_field_of_view(sensor.halves, at[inside], p, R_nc)]
             hit[image, inside] = lines_clear(world.terrain, at[inside], p) if len(inside) else True
     return hit
 

@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import stdtrit
 
 from wildlab.geometry.camera import Camera, normalise
 from wildlab.geometry.camera_poses import CameraPoses, Mount
+from wildlab.geometry.covariances import NamedEstimates
 from wildlab.geometry.frames import Array, euler_to_matrix, matrix_to_euler
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.geometry.uncertainty import ground_jacobians
@@ -69,7 +69,7 @@ PosesAt = Callable[[float], CameraPoses]
 
 
 @dataclass(frozen=True)
-class Calibration:
+class Calibration(NamedEstimates):
     """An estimate of some of :data:`PARAMETERS`.
 
     Attributes
@@ -108,24 +108,11 @@ class Calibration:
         values = sizes * np.array([PARAMETERS[name] for name in names])
         return cls(names, values, np.zeros((len(names),) * 2), {}, 0, 0)
 
-    def value(self, name: str) -> float:
-        """The correction called ``name``, zero where it was not estimated."""
-        return float(self.values[self.names.index(name)]) if name in self.names else 0.0
-
-    def sd(self, name: str) -> float:
-        """Its standard deviation; NaN where it was not estimated."""
-        if name not in self.names:
-            return float("nan")
-        i = self.names.index(name)
-        return float(np.sqrt(self.covariance[i, i]))
-
-    def interval(self, name: str, probability: float = 0.95) -> tuple[float, float]:
-        """Student's interval of the correction called ``name``; NaN where it was not estimated."""
-        freedom = self.n_draws - 1 if self.n_draws > 1 else 1e9
+    def freedom_of(self, name: str) -> float:
+        """Degrees of freedom of a variance."""
         if self.freedom is not None and name in self.names:
-            freedom = self.freedom[self.names.index(name)]
-        half = float(stdtrit(freedom, (1 + probability) / 2)) * self.sd(name)
-        return self.value(name) - half, self.value(name) + half
+            return float(self.freedom[self.names.index(name)])
+        return self.n_draws - 1 if self.n_draws > 1 else 1e9
 
 
 def apply_calibration(calibration: Calibration, mount: Mount) -> Mount:

@@ -435,3 +435,31 @@ def pose_covariance(
     pose[..., 2, 2] = np.square(np.asarray(vertical, float))
     pose[..., 3:, 3:] = attitude_covariance(tilt, heading, R_nb)
     return pose
+
+
+class NamedEstimates:
+    """Estimates (P,) with names and their covariance (P, P)."""
+
+    names: tuple[str, ...]
+    values: Array
+    covariance: Array
+
+    def value(self, name: str) -> float:
+        """The estimate called ``name``; zero where it was not estimated."""
+        return float(self.values[self.names.index(name)]) if name in self.names else 0.0
+
+    def sd(self, name: str) -> float:
+        """Its standard deviation; NaN where it was not estimated."""
+        if name not in self.names:
+            return float("nan")
+        i = self.names.index(name)
+        return float(np.sqrt(self.covariance[i, i]))
+
+    def freedom_of(self, name: str) -> float:
+        """Degrees of freedom of its variance."""
+        raise NotImplementedError
+
+    def interval(self, name: str, probability: float = 0.95) -> tuple[float, float]:
+        """Student's interval of the estimate called ``name``; NaN where it was not estimated."""
+        half = student_quantile((1 + probability) / 2, self.freedom_of(name)) * self.sd(name)
+        return self.value(name) - half, self.value(name) + half

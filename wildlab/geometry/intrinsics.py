@@ -15,10 +15,10 @@ from typing import Any, NamedTuple
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import stdtrit
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera, project
+from wildlab.geometry.covariances import NamedEstimates
 from wildlab.geometry.frames import Array
 
 #: The pinhole, and lenses that bend more and more.
@@ -74,7 +74,7 @@ def project_board(camera: Camera, views: Views, board: ArrayLike) -> Array:
 
 
 @dataclass(frozen=True)
-class Intrinsics:
+class Intrinsics(NamedEstimates):
     """A camera from V views of a board.
 
     Attributes
@@ -120,21 +120,9 @@ class Intrinsics:
         """The camera with other values (P,) of what was estimated."""
         return _camera(dict(zip(self.names, np.asarray(values, float).tolist(), strict=True)), self.camera)
 
-    def value(self, name: str) -> float:
-        """The estimate called ``name``; zero where it was held."""
-        return float(self.values[self.names.index(name)]) if name in self.names else 0.0
-
-    def sd(self, name: str) -> float:
-        """Its standard deviation; NaN where it was held."""
-        if name not in self.names:
-            return float("nan")
-        i = self.names.index(name)
-        return float(np.sqrt(self.covariance[i, i]))
-
-    def interval(self, name: str, probability: float = 0.95) -> tuple[float, float]:
-        """Student's interval of the parameter called ``name``, by the number of views."""
-        half = float(stdtrit(len(self.residuals) - 1, (1 + probability) / 2)) * self.sd(name)
-        return self.value(name) - half, self.value(name) + half
+    def freedom_of(self, name: str) -> float:
+        """By the number of views."""
+        return len(self.residuals) - 1
 
 
 def parameters_of(camera: Camera) -> dict[str, float]:

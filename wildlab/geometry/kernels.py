@@ -341,9 +341,6 @@ def walk_all(
     return at, became
 
 
-#: Any array: the types are the compiler's business.
-
-
 @compiled
 def touches(height: Array, i: int, j: int, u: float, v: float, z: float, ray: Array, end: float) -> bool:
     """Whether a line that enters patch (i, j) at (u, v, z) comes down to it within ``end`` of its parameter.
@@ -363,13 +360,6 @@ def touches(height: Array, i: int, j: int, u: float, v: float, z: float, ray: Ar
     # Between both ends it dips where the height above the ground is bent upwards and falls at first.
     dips: bool = bend > 0 and slope < 0 and -slope < 2 * bend * end and slope * slope >= 4 * bend * above
     return dips
-
-
-@compiled
-def inside(position: float, along: float, before: int, first: int, last: int) -> int:
-    """Cell of a position within first to last, never behind the one before: rounding makes circles."""
-    now = min(max(int(position), first), last)
-    return max(now, before) if along > 0 else min(now, before)
 
 
 @compiled
@@ -433,11 +423,11 @@ def hidden_at(
         if tx <= ty:
             j = right if dx > 0 else left - 1
             if tx < ty:
-                i = inside(y + t * dy, dy, i, low, high - 1)
+                i = onward(y + t * dy, dy, i, low, high - 1)
         if ty <= tx:
             i = high if dy > 0 else low - 1
             if ty < tx:
-                j = inside(x + t * dx, dx, j, left, right - 1)
+                j = onward(x + t * dx, dx, j, left, right - 1)
         if not (0 <= i < rows - 1 and 0 <= j < columns - 1):
             return np.nan
         # The block about this one was looked at and is too high; the next one may not be.

@@ -268,8 +268,7 @@ def run_mekf(
     (True, [1, 1, 1, 1])
     """
     wanted = checked_imu(imu).times if output_times is None else np.asarray(output_times, float)
-    known = np.isfinite(wanted)
-    times, row = np.unique(wanted[known], return_inverse=True)
+    times, row = np.unique(wanted, return_inverse=True)
     ready = prepare(imu, start, noise, aiding, times, gate_probability, outages, axes)
     line, measured = ready.line, ready.measured
     states, covariances = np.full((len(times), 16), np.nan), np.full((len(times), 15, 15), np.nan)
@@ -286,10 +285,7 @@ def run_mekf(
     for gap in ready.gaps:
         unknown = (times > gap.start) & (times < gap.end)
         states[unknown], covariances[unknown] = np.nan, np.nan
-    whole = np.full((len(wanted), 16), np.nan), np.full((len(wanted), 15, 15), np.nan)
-    for all_rows, found in zip(whole, (states, covariances), strict=True):
-        all_rows[known] = found[row]
-    states, covariances = whole
+    states, covariances = states[row], covariances[row]
     what = Innovations(line.times[measured.node], ready.source, innovation, S, nis, verdict)
     parts = (states[:, :3], states[:, 3:6], states[:, 6:10], states[:, 10:13], states[:, 13:])
     return Navigation(wanted, *parts, covariances, what, ready.gaps, ready.unused)

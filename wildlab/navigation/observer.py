@@ -410,10 +410,8 @@ def prepare(
     p_e, R_en = earth_axes(origin)
     in_e = [a._replace(value=a.value @ R_en.T + (p_e if a.kind == POSITION else 0.0)) for a in aiding]
     measured, _, unused = gather(in_e, line)
-    between = np.diff(np.unique(measured.node[measured.kind == REFERENCE]))
-    apart = (
-        np.diff(line.times[np.unique(measured.node[measured.kind == REFERENCE])]) if len(between) else [0.0]
-    )
+    seen = line.times[np.unique(measured.node[measured.kind == REFERENCE])]
+    apart = np.diff(seen) if len(seen) > 1 else [0.0]
     numbers = np.array(
         [
             gains.k1, gains.k2, gains.k_i, gains.bias_bound, 1.2 * gains.bias_bound, gains.theta,
@@ -470,8 +468,7 @@ def run_observer(
         outside the inertial samples.
     """
     wanted = checked_imu(imu).times if output_times is None else np.asarray(output_times, float)
-    known = np.isfinite(wanted)
-    times, row = np.unique(wanted[known], return_inverse=True)
+    times, row = np.unique(wanted, return_inverse=True)
     ready = prepare(imu, start, origin, aiding, gains or Gains(), times, max_gap)
     line, measured = ready.line, ready.measured
     out = np.full((len(times), 16), np.nan)
@@ -483,8 +480,7 @@ def run_observer(
         )  # fmt: skip
     for gap in ready.gaps:
         out[(times > gap.start) & (times < gap.end)] = np.nan
-    rows = np.full((len(wanted), 16), np.nan)
-    rows[known] = out[row]
+    rows = out[row]
     p_e, R_en = earth_axes(origin)
     quaternion = np.full((len(wanted), 4), np.nan)
     filled = np.isfinite(rows[:, 0])

@@ -25,8 +25,8 @@ class SearchSensor:
 
     Attributes
     ----------
-    half_width, half_height
-        Tangents of half the angles of view, F (2.23).
+    halves
+        Tangents of half the angles of view across and down, F (2.23).
     sd
         Standard deviation of both angles of (5.7), rad; a parameter, which F does not print.
     reach
@@ -36,8 +36,7 @@ class SearchSensor:
         it one would tell any amount about a point that stands for a whole cell: half a cell is right.
     """
 
-    half_width: float
-    half_height: float
+    halves: tuple[float, float]
     sd: float
     reach: float
     nearest: float = 1.0
@@ -250,9 +249,7 @@ def sideways_limit(R_nc: ArrayLike, depth: ArrayLike, sensor: SearchSensor) -> A
     -------
     (...) m; infinite where a corner of the image is at or above the horizon.
     """
-    corners = np.array(
-        [[i * sensor.half_width, j * sensor.half_height, 1.0] for i in (-1, 1) for j in (-1, 1)]
-    )
+    corners = np.array([[i * sensor.halves[0], j * sensor.halves[1], 1.0] for i in (-1, 1) for j in (-1, 1)])
     rays = np.asarray(R_nc, float) @ corners.T
     level, down = np.hypot(rays[..., 0, :], rays[..., 1, :]), rays[..., 2, :]
     with np.errstate(divide="ignore", invalid="ignore"):

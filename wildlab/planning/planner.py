@@ -27,7 +27,7 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.compilation import compiled
 from wildlab.geometry.frames import Array, Indices, Mask
 from wildlab.geometry.georeference import Terrain
-from wildlab.geometry.viewsheds import lines_clear
+from wildlab.geometry.viewsheds import in_field_of_view, lines_clear
 from wildlab.planning.legs import (
     Flying,
     Leg,
@@ -230,29 +230,6 @@ def grow_old_all(Y: Any, left: Any, q: float) -> None:
         left[i] = inverse_trace(y[0, 0], y[0, 1], m0, y[1, 1], m1, y[2, 2])
 
 
-def in_field_of_view(points: ArrayLike, p_nc: ArrayLike, R_nc: ArrayLike, sensor: SearchSensor) -> Mask:
-    """Which points lie in the field of view, F (2.22)-(2.23); what hides them is not asked.
-
-    Parameters
-    ----------
-    points
-        (N, 3) in n, m.
-    p_nc
-        Of the camera, (3,), m.
-    R_nc
-        (3, 3), takes a vector from c (z out of the lens) to n.
-    sensor
-        Its half angles are used.
-
-    Returns
-    -------
-    (N,) bool.
-    """
-    x, y, z = ((np.asarray(points, float) - np.asarray(p_nc, float)) @ np.asarray(R_nc, float)).T
-    inside = (np.abs(x) <= sensor.half_width * z) & (np.abs(y) <= sensor.half_height * z)
-    return np.asarray(inside & (z > 0))
-
-
 def detection_probability(
     points: ArrayLike,
     p_nc: ArrayLike,
@@ -279,13 +256,13 @@ def detection_probability(
     Examples
     --------
     >>> down = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    >>> sensor = SearchSensor(0.3, 0.2, sd=0.01, reach=100.0)
+    >>> sensor = SearchSensor((0.3, 0.2), sd=0.01, reach=100.0)
     >>> ground = [[0.0, 0.0, 0.0], [0.0, 80.0, 0.0]]
     >>> print(np.round(detection_probability(ground, [0.0, 0.0, -50.0], down, sensor), 2))
     [0.78 0.  ]
     """
     away = np.asarray(points, float) - np.asarray(p_nc, float)
-    seen = in_field_of_view(points, p_nc, R_nc, sensor)
+    seen = in_field_of_view(sensor.halves, points, p_nc, R_nc)
     return np.where(seen, np.exp(-(away**2).sum(axis=-1) / sensor.reach**2), 0.0)
 
 
@@ -399,7 +376,7 @@ class InformationPlanner:
         each = np.bincount(self._block)
         sums = [np.bincount(self._block, self.points[:, axis]) for axis in (0, 1)]
         self._middles = np.stack(sums, axis=-1) / each[:, None]
-        self._half = np.array([sensor.half_width, sensor.half_height])
+        self._half = np.array(sensor.halves)
 
     def add(self, leg: Leg, clear: Mask | None = None) -> None:
         """Add what the images of a leg tell, F (5.10).
@@ -610,59 +587,6 @@ def best_goal(
     """
     worth = utilities(positions, covariances, platform, way_point, alpha=alpha, c=c)
     if worth.max() == -np.inf:
-        raise WildlabError("there is no goal left", "end the search when all is done (all_positioned)")
+        raise WildlabError("there is no goal left", "end the search when all is done")
     k = int(np.argmax(worth))
     return SEARCH if k == len(worth) - 1 else k
-
-
-def all_positioned(known: ArrayLike, live: ArrayLike) -> Mask:
-    """Which enclosures are done: as many animals are known at once as live there, F 5.3.
-
-    Parameters
-    ----------
-    known
-        (E,) animals with an estimate that is not lost.
-    live
-        (E,) that live there, which F takes as known.
-
-    Returns
-    -------
-    (E,) bool; the search ends where all are.
-    """
-    return np.asarray(np.asarray(known) >= np.asarray(live))
-
-
-def lost_by_covariance(covariances: ArrayLike, limit: float) -> Mask:
-    """Which animals are lost because too little is known of them, F 5.3: Tr(P) beyond a limit.
-
-    Parameters
-    ----------
-    covariances
-        (m, 2, 2) m^2.
-    limit
-        Of the trace, m^2; F prints none.
-
-    Returns
-    -------
-    (m,) bool.
-    """
-    P = np.asarray(covariances, float).reshape(-1, 2, 2)
-    return np.asarray(np.trace(P, axis1=1, axis2=2) > limit)
-
-
-def lost_by_search(missed: ArrayLike, doubt: float) -> Mask:
-    """Which animals are lost because they were not where they should be, F 5.3.4.
-
-    Parameters
-    ----------
-    missed
-        (m,) probability that all images of the estimated position and what lies about it would have missed an
-        animal that is there: the product of 1 - P_D (5.8) since it was last found.
-    doubt
-        Below this one no longer believes in it.
-
-    Returns
-    -------
-    (m,) bool.
-    """
-    return np.asarray(np.asarray(missed, float) < doubt)

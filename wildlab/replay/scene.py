@@ -17,10 +17,11 @@ from wildlab.analysis.georeference import (
     georeference,
     score_points,
 )
-from wildlab.analysis.overview import POSITION, cover_images, ground_height, ordered
+from wildlab.analysis.overview import cover_images, ground_height, ordered
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import position_nees
 from wildlab.flight.clocks import frame_times
+from wildlab.flight.schema import POSITION
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.georeference import Terrain
@@ -413,7 +414,7 @@ def _points(flight: Flight, source: str | None, lacks: list[str]) -> Points | No
     except WildlabError as refusal:
         lacks.append(f"detections on the ground: {refusal.problem}")
         return None
-    xyz = table[["north_m", "east_m", "down_m"]].to_numpy(float)
+    xyz = table[POSITION].to_numpy(float)
     good = np.isfinite(xyz).all(axis=1) & np.isfinite(table["time_s"].to_numpy(float))
     if not good.all():
         lacks.append(f"{int((~good).sum())} of {len(table)} detections on the ground: their rays miss it")
@@ -434,7 +435,7 @@ def _points(flight: Flight, source: str | None, lacks: list[str]) -> Points | No
             lacks.append(f"errors of the detections: {refusal.problem}")
     return Points(
         table["time_s"].to_numpy(float),
-        table[["north_m", "east_m", "down_m"]].to_numpy(float),
+        table[POSITION].to_numpy(float),
         P,
         table["target_id"].astype(str).to_numpy(object),
         np.hypot(*error.T),
@@ -479,7 +480,7 @@ def _truth(flight: Flight, lacks: list[str]) -> tuple[Target, ...]:
     found = []
     for name, rows in flight.truth.groupby("target_id", sort=False):
         stamps = rows["time_s"].to_numpy(float) + offset
-        where = rows[["north_m", "east_m", "down_m"]].to_numpy(float)
+        where = rows[POSITION].to_numpy(float)
         if np.isnan(stamps).all():
             found.append(Target(str(name), stamps[:1], where[:1]))
             continue

@@ -35,7 +35,7 @@ from wildlab.flight.manifest import (
     TargetsPart,
     make_manifest,
 )
-from wildlab.flight.schema import COVARIANCE_COLUMNS, NAV, TABLES
+from wildlab.flight.schema import COVARIANCE_COLUMNS, FIELD, NAV, POSITION, TABLES, VELOCITY
 from wildlab.flight.store import PREFERRED, Flight
 from wildlab.geometry.frames import Array, Earth, local_earth, ned_to_geodetic
 from wildlab.navigation.aiding import earth_field
@@ -246,8 +246,6 @@ def hulls_of(targets: TargetsPart) -> tuple[str, ...]:
 
 _FORCE = ["f_x_m_s2", "f_y_m_s2", "f_z_m_s2"]
 _RATE = ["w_x_rad_s", "w_y_rad_s", "w_z_rad_s"]
-FIELD = ["field_x_ut", "field_y_ut", "field_z_ut"]
-_VELOCITY = ["v_north_m_s", "v_east_m_s", "v_down_m_s"]
 #: The field that stands for the true one: due north, 60 degrees down, uT.
 USUAL_FIELD, USUAL_DECLINATION_DEG, USUAL_INCLINATION_DEG = 50.0, 0.0, 60.0
 
@@ -307,11 +305,11 @@ def _motion(nav: pd.DataFrame, times: Array) -> tuple[Array, Array, Array]:
             np.zeros((len(times), 3)),
         )
     v = np.zeros((len(times), 3))
-    if set(_VELOCITY) <= set(nav):
-        known = nav[["time_s", *_VELOCITY]].dropna()
+    if set(VELOCITY) <= set(nav):
+        known = nav[["time_s", *VELOCITY]].dropna()
         if len(known):
             stamps = known["time_s"].to_numpy(float)
-            v = np.column_stack([np.interp(times, stamps, known[name].to_numpy(float)) for name in _VELOCITY])
+            v = np.column_stack([np.interp(times, stamps, known[name].to_numpy(float)) for name in VELOCITY])
     return p, R, v
 
 
@@ -359,7 +357,7 @@ def moved_field(
 #: Where a flight is put whose place is withheld: a latitude that is nobody's.
 NOWHERE = (45.0, 0.0)
 _PLACES = (
-    ("north_m", "east_m", "down_m"),
+    (*POSITION,),
     ("second_north_m", "second_east_m", "second_down_m"),
     (None, None, "plane_down_m"),
 )
@@ -602,7 +600,7 @@ def _flown(flight: Flight) -> Array:
     tables = [*flight.nav.values(), *(flight.tables[name] for name in ("gnss",) if name in flight.tables)]
     if not tables and flight.truth is not None:
         tables = [flight.truth]
-    p = [table[["north_m", "east_m", "down_m"]].to_numpy(float) for table in tables]
+    p = [table[POSITION].to_numpy(float) for table in tables]
     whole = np.concatenate(p) if p else np.empty((0, 3))
     return np.asarray(whole[np.isfinite(whole).all(axis=1)])
 

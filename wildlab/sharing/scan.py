@@ -27,6 +27,7 @@ from pyproj import Proj
 
 from wildlab.errors import WildlabError
 from wildlab.flight.manifest import Manifest, parse_settings
+from wildlab.flight.schema import POSITION
 from wildlab.flight.store import Flight
 from wildlab.flight.terrain import undulation
 from wildlab.geometry.frames import Array, ned_to_geodetic, normal_gravity
@@ -145,8 +146,8 @@ def _known_places(flight: Flight) -> Array:
     """(N, 3) latitude and longitude, deg, and height, m: the origin, the middle, and some of every table."""
     p = [np.zeros((1, 3)), new_origin(flight)[None]]
     for table in (*flight.nav.values(), *flight.tables.values()):
-        if {"north_m", "east_m", "down_m"} <= set(table):
-            rows = table[["north_m", "east_m", "down_m"]].to_numpy(float)
+        if set(POSITION) <= set(table):
+            rows = table[POSITION].to_numpy(float)
             rows = rows[np.isfinite(rows).all(axis=1)]
             p.append(
                 rows[np.unique(np.linspace(0, len(rows) - 1, _PLACES_EACH).astype(int))]

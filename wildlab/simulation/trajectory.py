@@ -30,22 +30,19 @@ class Disturbance:
     frequencies: Array
     phases: Array
 
-    def __call__(self, times: ArrayLike, derivative: int = 0) -> Array:
-        """The signal or one of its derivatives with respect to time. (N,) s -> (N,)."""
-        strength = self.amplitudes * self.frequencies**derivative
-        phases = self.phases + derivative * np.pi / 2
-        return np.asarray(_summed(times, strength, self.frequencies, phases, 1)[0])
+    def __call__(self, times: ArrayLike) -> Array:
+        """The signal. (N,) s -> (N,)."""
+        return np.asarray(self._summed(times, 1)[0])
 
     def with_derivatives(self, times: ArrayLike) -> Array:
         """The signal and its first two derivatives with respect to time. (N,) s -> (3, N)."""
-        return _summed(times, self.amplitudes, self.frequencies, self.phases, 3)
+        return self._summed(times, 3)
 
-
-def _summed(times: ArrayLike, amplitudes: Array, frequencies: Array, phases: Array, rows: int) -> Array:
-    t = np.ascontiguousarray(times, float)
-    out = np.empty((rows, len(t)))
-    kernels.sum_of_sines(t, amplitudes, frequencies, phases, out)
-    return out
+    def _summed(self, times: ArrayLike, rows: int) -> Array:
+        t = np.ascontiguousarray(times, float)
+        out = np.empty((rows, len(t)))
+        kernels.sum_of_sines(t, self.amplitudes, self.frequencies, self.phases, out)
+        return out
 
 
 def no_disturbance() -> Disturbance:

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.evaluation.shares import FAILS, HOLDS, UNDECIDABLE
+from wildlab.flight.schema import POSITION, QUATERNION
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import in_image
 from wildlab.geometry.camera_poses import CameraPoses, Mount
@@ -139,8 +140,8 @@ def overflight(flight: Flight) -> Overflight:
     known = nav["time_s"].to_numpy(float)
     ticks = np.arange(np.ceil(known[0] * RATE_HZ), np.floor(known[-1] * RATE_HZ) + 1) / RATE_HZ
     rows = np.searchsorted(known, ticks - 1e-6)
-    p = nav[["north_m", "east_m", "down_m"]].to_numpy(float)[rows]
-    R_nb = quaternion_to_matrix(nav[["q_w", "q_x", "q_y", "q_z"]].to_numpy(float)[rows])
+    p = nav[POSITION].to_numpy(float)[rows]
+    R_nb = quaternion_to_matrix(nav[QUATERNION].to_numpy(float)[rows])
     camera = flight.manifest.geometry_camera()
     tilt = _tilt_to_origin(p, R_nb)
     part = _stretch(CameraPoses(camera, Mount(), p, R_nb, np.zeros(len(p)), tilt))

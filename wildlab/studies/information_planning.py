@@ -280,11 +280,11 @@ def draw_scene(seed: int, twin: str) -> PlanningScene:
     start = Platform(corner, heading, look_attitude(heading, 0.0, 0.0))
     camera = given.camera
     # Tangents of half the angles of view, F (2.23).
-    half_width, half_height = (
-        float(size.number / 2 / focal.number)
-        for size, focal in ((camera.width, camera.fx), (camera.height, camera.fy))
+    halves = (
+        float(camera.width.number / 2 / camera.fx.number),
+        float(camera.height.number / 2 / camera.fy.number),
     )
-    sensor = SearchSensor(half_width, half_height, ANGLE_SD, REACH_M, CELL_M / 2)
+    sensor = SearchSensor(halves, ANGLE_SD, REACH_M, CELL_M / 2)
     return PlanningScene(world, grid, area_of, start, sensor, flying, step_sd**2, first)
 
 

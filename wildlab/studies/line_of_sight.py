@@ -279,7 +279,7 @@ def timed(seeds: Iterable[int], twin: str, repeats: int = REPEATS) -> pd.DataFra
         grid point of the map to tell whether it is in view.
     """
     camera, rows, lands = camera_of(twin), {}, list(seeds)[:MOST]
-    angles = field_of_view(camera)
+    halves = field_of_view(camera)
     for seed in lands:
         land, rng = synthetic_landscape(seed), stream(seed, "times")
         row: dict[tuple[str, int], float] = {}
@@ -295,7 +295,7 @@ def timed(seeds: Iterable[int], twin: str, repeats: int = REPEATS) -> pd.DataFra
                     WHOLE_RAYS: partial(cast_rays, land, nodes, lens, STEP, TOLERANCE, shorten=False),
                     ANGLES: partial(compare_angles, land, nodes, lens),
                     EXACT: partial(lines_clear, land, ends, lens),
-                    VIEW: partial(in_field_of_view, angles, points[::PART], lens, view.R_nc),
+                    VIEW: partial(in_field_of_view, halves, points[::PART], lens, view.R_nc),
                 },
                 repeats,
             )

@@ -17,7 +17,6 @@ from wildlab.analysis.navigate import (
     PUBLISHED_LIKE,
     REFERENCES,
     SETTLING_S,
-    VELOCITY,
     MekfTuning,
     Navigated,
     NavigationErrors,
@@ -31,7 +30,7 @@ from wildlab.analysis.navigate import (
     reference_of,
     summarise,
 )
-from wildlab.analysis.verdict import VERDICT_LEVEL, Evidence, Verdict, verdict_of
+from wildlab.analysis.verdict import Evidence, Verdict, verdict_of
 from wildlab.evaluation.consistency import (
     autocorrelation,
     chi_square_interval,
@@ -39,6 +38,7 @@ from wildlab.evaluation.consistency import (
     white_bound,
 )
 from wildlab.flight.clocks import frame_times
+from wildlab.flight.schema import VELOCITY
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
 from wildlab.messages.catalogue import Message, load_texts
@@ -504,17 +504,10 @@ def show_logged(report: Report, studied: Studied, parts: Sequence[Part]) -> None
     texts = load_texts("navigation-logged")
     wording = Wording(report, texts)
     names = texts.subjects
-    mine = summarise(studied.scored["mekf"], *first[1:])
-    verdict = verdict_of_attitude(mine)
+    verdict = verdict_of_attitude(summarise(studied.scored["mekf"], *first[1:]))
     report.head(names["question"], wording.say(texts.subtitle))
     said = attitude_messages(studied, first)
-    reason = Message("reason", said[0].values)
-    report.summary(
-        wording.messages(said),
-        level=verdict.colour,
-        verdict=(verdict.value, wording.messages([reason])[0]),
-    )
-    report.metric(VERDICT_LEVEL, "navigation", verdict.level, "1")
+    wording.summary(said, verdict, Message("reason", said[0].values), "navigation")
     report.tiles([tile_of(report, one, wording) for one in texts.tiles])
     main, *others = logged_figures(studied, window)
     wording.figure(main.text, main.fig, main.name, main=True)

@@ -21,6 +21,7 @@ from wildlab.detection.floating import find_objects
 from wildlab.detection.flow import Features, Matches, filled_outlines, find_features, match_features
 from wildlab.errors import WildlabError
 from wildlab.flight.clocks import between, frame_times
+from wildlab.flight.schema import VELOCITY
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses, Mount
@@ -44,7 +45,6 @@ from wildlab.studies.vessel_detection import Photographer
 #: What is known of an autopilot's velocity (m/s per axis), of angular rates from two of its attitudes or of
 #: a gimbal's angles (deg/s), where nothing states it: a tenth of a degree, twice in an eighth of a second.
 USUAL_MOTION = {"velocity_m_s": 0.3, "rate_deg_s": 1.0, "gimbal_rate_deg_s": 1.0}
-_VELOCITY = ["v_north_m_s", "v_east_m_s", "v_down_m_s"]
 
 
 class FramePair(NamedTuple):
@@ -109,7 +109,7 @@ def pair_velocities(
     poses = replace(poses, camera=reading.camera or poses.camera, mount=reading.mount or poses.mount)
     middle = stamps[rows].mean(axis=1)
     nav = flight.nav[reading.source]
-    velocities = between(nav["time_s"].to_numpy(float), nav[_VELOCITY].to_numpy(float), middle, "nav")
+    velocities = between(nav["time_s"].to_numpy(float), nav[VELOCITY].to_numpy(float), middle, "nav")
     interval, found = float(np.median(np.diff(stamps))), []
     for pair, when, velocity in zip(pairs, middle, velocities, strict=True):
         apart = float(stamps[pair.second] - stamps[pair.first])

@@ -22,7 +22,6 @@ from wildlab.analysis.navigate import (
     AXES,
     PLACES,
     PUBLISHED_LIKE,
-    VELOCITY,
     NavigationErrors,
     errors_against,
     navigate_mekf,
@@ -50,6 +49,7 @@ from wildlab.evaluation.errors import SLOWEST_M_S, summarise_track, track_errors
 from wildlab.evaluation.intervals import share_interval
 from wildlab.evaluation.pose_noise import PRIOR
 from wildlab.flight.clocks import frame_times, poses_at
+from wildlab.flight.schema import VELOCITY
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array, Indices, matrix_to_euler, wrap
 from wildlab.geometry.uncertainty import ground_jacobians

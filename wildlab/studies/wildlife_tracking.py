@@ -36,7 +36,7 @@ from wildlab.analysis.animal_trackers import (
     track_animals,
     turns,
 )
-from wildlab.analysis.plan_coverage import ExecutionErrors, with_errors
+from wildlab.analysis.plan_coverage import ExecutionErrors, displaced, drawn_errors
 from wildlab.evaluation.intervals import mean_interval, mean_share_interval, share_interval
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
@@ -212,7 +212,8 @@ def draw_world(platform: str, twin_name: str, seed: int) -> World:
     rows = np.tile(np.arange(len(way.times)), LAPS)
     times = (way.times + way.lap * np.arange(LAPS)[:, None]).ravel()
     nominal, headings = way.poses.take(rows), way.headings[rows]
-    true = with_errors(nominal, headings, errors, 1 / rate, stream(seed, f"execution, {platform}"))
+    rng = stream(seed, f"execution, {platform}")
+    true = displaced(nominal, headings, *drawn_errors(len(headings), errors, 1 / rate, rng))
     detector = detector_of(twin)
     truth = herds(twin, fences, times, seed)
     images = take_images(

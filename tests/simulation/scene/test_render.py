@@ -7,8 +7,19 @@ from wildlab.geometry.camera import Camera, normalise
 from wildlab.geometry.camera_poses import CameraPoses, Mount
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import georeference_pixels
-from wildlab.simulation.scene.bodies import Body, Layer, rectangle, vessel
-from wildlab.simulation.scene.render import EVEN, Scene, Sea, mean_square_slope, outline_of, render, tiles_of
+from wildlab.simulation.scene.render import (
+    EVEN,
+    Body,
+    Layer,
+    Scene,
+    Sea,
+    mean_square_slope,
+    outline_of,
+    rectangle,
+    render,
+    tiles_of,
+    vessel,
+)
 
 CAMERA = Camera(160, 128, 290.0, 292.0, 78.0, 66.0)
 

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from wildlab.simulation.parameters import load_twin
-from wildlab.simulation.scene.bodies import fitted_out, vessel
 from wildlab.simulation.scene.flights import (
     IDEAL,
     CameraResponse,
@@ -14,6 +13,7 @@ from wildlab.simulation.scene.flights import (
     sensor_of,
     to_counts,
 )
+from wildlab.simulation.scene.render import fitted_out, vessel
 
 SHAPE = (120, 160)
 

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from wildlab.analysis.overview import TROUBLES, Coverage, Issue, Path
 from wildlab.evaluation.streams import FINE, HARMFUL, Pace
+from wildlab.flight.schema import QUATERNION
 from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
 from wildlab.names import figure_name
 from wildlab.reporting.charts.drawing import (
@@ -66,7 +67,7 @@ def poses_between(nav: Mapping[str, pd.DataFrame], start: float, end: float) -> 
     velocity: dict[str, dict[str, tuple[ArrayLike, ArrayLike]]] = {}
     for name, table in nav.items():
         part = table[table["time_s"].between(start, end)]
-        q = part[["q_w", "q_x", "q_y", "q_z"]].to_numpy(float)
+        q = part[QUATERNION].to_numpy(float)
         euler = np.degrees(matrix_to_euler(quaternion_to_matrix(q))).T
         for label, angle in zip(ANGLES, euler, strict=True):
             attitude.setdefault(label, {})[name] = part["time_s"], angle

@@ -1,8 +1,8 @@
 """Scenes: what a thermal camera would see of sea and land and of what is on them, with exact labels.
 
 A scene is rendered from a pose, with the projection of `wildlab.geometry`; what is found in it is then
-judged against labels that are known and not marked by anybody. `bodies` has vessels, `drawn` what stands on
-land; `render` makes kelvin and labels of the sea, `land` of covers under the sun of a day; `flights` takes
+judged against labels that are known and not marked by anybody. `render` makes kelvin and labels of the
+sea and of vessels, `land` of covers under the sun of a day, `drawn` has what stands on land; `flights` takes
 images along a twin's flight, with the faults of a camera. `coloured` is even ground and a tarpaulin as a
 colour camera sees them. All of it is chosen; nothing in it knows of a detector.
 

@@ -11,7 +11,6 @@ import numpy as np
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses, Mount
 from wildlab.geometry.frames import Array, euler_to_matrix
-from wildlab.simulation.scene.bodies import Body, Hot, Layer, oval, rectangle
 from wildlab.simulation.scene.land import (
     ROCK,
     SHADOW_DEPTH,
@@ -22,6 +21,7 @@ from wildlab.simulation.scene.land import (
     height_at,
     rolling_land,
 )
+from wildlab.simulation.scene.render import Body, Hot, Layer, oval, rectangle
 
 #: Temperature of the blood, K.
 BLOOD = 310.15

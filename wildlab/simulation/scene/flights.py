@@ -20,8 +20,16 @@ from wildlab.simulation.courses import twin_trajectory
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.manifest import as_flown
 from wildlab.simulation.parameters import TwinParameters
-from wildlab.simulation.scene.bodies import Body, fitted_out, vessel
-from wildlab.simulation.scene.render import RenderedView, Scene, Sea, outline_of, render
+from wildlab.simulation.scene.render import (
+    Body,
+    RenderedView,
+    Scene,
+    Sea,
+    fitted_out,
+    outline_of,
+    render,
+    vessel,
+)
 from wildlab.simulation.target_motion import target_path
 from wildlab.simulation.trajectory import camera_motion
 

@@ -23,8 +23,7 @@ from scipy import fft
 from wildlab.geometry.camera import Camera, normalise
 from wildlab.geometry.frames import Array
 from wildlab.simulation.scene import kernels
-from wildlab.simulation.scene.bodies import Body
-from wildlab.simulation.scene.render import SeenBody, check_above, draw_bodies, pixel_coordinates
+from wildlab.simulation.scene.render import Body, SeenBody, check_above, draw_bodies, pixel_coordinates
 
 Tile = NDArray[np.float32]
 
