@@ -45,7 +45,7 @@ def test_without_known_places_a_point_is_held_against_its_thing_in_other_blocks(
     rng = np.random.default_rng(0)
     things, xy = np.arange(60) % 5, rng.normal(size=(60, 2))
     nothing = Linear(np.empty((60, 2, 0)), xy, np.zeros(0), lambda values: xy)
-    folds = leave_out(BLOCKS, USED, POINTS, WHITE, Places(things, np.full(60, np.inf), np.full(60, np.nan)))
+    folds = leave_out(BLOCKS, USED, POINTS, WHITE, Places(things, np.full(60, np.inf), np.zeros(60, bool)))
     held = held_out(nothing, folds, USED, things)
     others = (things == things[7]) & (BLOCKS[7] != BLOCKS)
     np.testing.assert_allclose(held[7], xy[7] - xy[others].mean(axis=0))

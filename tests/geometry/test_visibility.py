@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.georeference import MISSED, Terrain, intersect_terrain
+from wildlab.geometry.georeference import Terrain, intersect_terrain
+from wildlab.geometry.rays import MISSED
 from wildlab.geometry.viewsheds import SHORT_OF, lines_clear
 
 CAMERA = Camera(160, 128, 250.0, 250.0, 80.0, 64.0)

@@ -424,12 +424,11 @@ class _Search:
         frames = pd.Index(flight.table("frames")["frame_id"]).get_indexer(pd.Index(scored["frame_id"]))
         self.order = scored["time_s"].to_numpy(float) if seconds else frames.astype(float)
         self.lasts = LASTS_S if seconds else LASTS_IMAGES
-        sd, when = np.full(len(scored), np.inf), np.full(len(scored), np.nan)
+        sd, logged = np.full(len(scored), np.inf), np.zeros(len(scored), bool)
         if places_known:
             sd, truth = scored["truth_sd_m"].to_numpy(float), flight.table("truth")
             logged = np.isin(self.names_of, truth.loc[truth["time_s"].notna(), "target_id"].astype(str))
-            when[logged] = self.order[logged]
-        self.places = Places(self.names_of, sd, when) if sd.any() else None
+        self.places = Places(self.names_of, sd, logged) if sd.any() else None
         self.assumed = _pose_points(chosen, self.order)[1]
         self.logged = self.place((), np.zeros(0))
         self.cut = _cut(chosen)

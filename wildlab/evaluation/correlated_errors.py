@@ -34,8 +34,6 @@ PRIOR_SHARE = 1.5
 #: Time constants of positions, tilts and headings about which their priors lie, s: minutes for a satellite
 #: fix and a heading, tens of seconds for a tilt (H 5.6). Where images have no times, images.
 LASTS_S, LASTS_IMAGES = (60.0, 20.0, 60.0), (10.0, 3.0, 10.0)
-#: Values at most by which errors of all logged places together are known.
-KNOTS = 100
 #: Which of them each of the six pose errors has.
 _LASTS = [0, 0, 0, 1, 1, 2]
 
@@ -72,40 +70,24 @@ class Places(NamedTuple):
         (N,) names.
     sd
         (N,) standard deviation of the place along either axis, m; infinite where nothing is known of it.
-    time
-        (N,) s, where the place is from a receiver's log: its error then wanders as that of logged positions
-        does, with the same time constant. NaN where it is off by the same all the time.
+    moves
+        (N,) whether the place is from a receiver's log: its error then wanders as that of logged positions
+        does, with the same time constant. Others are off by the same all the time.
     """
 
     of: NDArray[np.generic]
     sd: Array
-    time: Array
+    moves: NDArray[np.bool_]
 
     def take(self, rows: NDArray[np.bool_]) -> Places:
         """Of some of the points."""
-        return Places(self.of[rows], self.sd[rows], self.time[rows])
+        return Places(self.of[rows], self.sd[rows], self.moves[rows])
 
-    def loadings(self, lasts: float) -> tuple[Array, Array]:
-        """(N, K) of independent errors of unit variance, and the variance (N,) that they leave to each point.
-
-        Where there are many times a process is known by its values at some, evenly in time; what they leave
-        is each point's own (fully independent training conditional: Snelson and Ghahramani 2006).
-        """
-        sd, wanders = np.where(np.isfinite(self.sd), self.sd, 1.0), np.isfinite(self.time)
-        moving, white = np.unique(self.of[wanders]), np.zeros(len(sd))
-        columns = [sd[:, None] * (self.of[:, None] == np.unique(self.of[~wanders]))]
-        for name in moving:
-            own, most = self.of == name, max(2, KNOTS // len(moving))
-            knots = np.unique(self.time[own])
-            if len(knots) > most:
-                knots = np.linspace(knots[0], knots[-1], most)
-            between, onto = (np.exp(-np.abs(at[:, None] - knots) / lasts) for at in (knots, self.time[own]))
-            # Images that were taken at once have the same error, which has no inverse.
-            factor = np.linalg.cholesky(between + 1e-9 * np.eye(len(knots)))
-            columns.append(np.zeros((len(sd), len(knots))))
-            columns[-1][own] = sd[own, None] * solve_triangular(factor, onto.T, lower=True).T
-            white[own] = np.maximum(sd[own] ** 2 - (columns[-1][own] ** 2).sum(axis=1), 0.0)
-        return np.hstack(columns), white
+    def loadings(self, moves: bool) -> Array:
+        """(N, 2, 2 K) of the errors of the K places that move, or of the others, in their own sizes."""
+        names = np.unique(self.of[self.moves == moves])
+        size = np.where(self.moves == moves, np.where(np.isfinite(self.sd), self.sd, 1.0), 0.0)
+        return np.kron(size[:, None] * (self.of[:, None] == names), np.eye(2)).reshape(len(size), 2, -1)
 
 
 class WanderNoise(NamedTuple):
@@ -185,17 +167,17 @@ class Covariance:
         self._order = np.argsort(image, kind="stable")
         self._image = image[self._order]
         sd = np.array([noise.sd[kind] for kind, axes in KINDS.items() for _ in axes])
-        self._G = points.derivatives[self._order] * sd
-        own = points.own + noise.sd["pixel"] ** 2 * points.pixel
+        G, lasts = points.derivatives * sd, np.take(noise.lasts, _LASTS)
         self._places = None
         if places is not None:
-            loadings, white = places.loadings(noise.lasts[0])
-            own = own + white[:, None, None] * np.eye(2)
-            prior = np.isfinite(places.sd).all() * np.eye(2 * loadings.shape[1])
-            self._places = np.kron(loadings, np.eye(2)).reshape(len(own), 2, -1), prior
-        self._own = own[self._order]
-        self._rho = np.minimum(np.exp(-np.diff(when)[:, None] / np.take(noise.lasts, _LASTS)), 1 - 1e-6)
-        self._share = noise.share
+            moving, still = places.loadings(True), places.loadings(False)
+            G = np.concatenate([G, moving], axis=2)
+            lasts = np.append(lasts, np.full(moving.shape[2], noise.lasts[0]))
+            self._places = still, np.isfinite(places.sd).all() * np.eye(still.shape[2])
+        self._G = np.ascontiguousarray(G[self._order])
+        self._own = (points.own + noise.sd["pixel"] ** 2 * points.pixel)[self._order]
+        self._rho = np.minimum(np.exp(-np.diff(when)[:, None] / lasts), 1 - 1e-6)
+        self._share = np.where(np.arange(len(lasts)) < len(_LASTS), noise.share, 1.0)
 
     def weigh(self, B: Array) -> tuple[Array, float]:
         """Products of the columns of B by the inverse covariance; its logarithmic determinant.
@@ -409,14 +391,14 @@ def _backward(L: Array, B: Array) -> None:
 
 @compiled
 def weigh_chain(
-    G: Array, own: Array, B: Array, image: NDArray[np.int64], rho: Array, share: float
+    G: Array, own: Array, B: Array, image: NDArray[np.int64], rho: Array, share: Array
 ) -> tuple[Array, Array, float]:
-    """What the weighed products of B need: with W (N, 2, K) and T (M, 12, K) they are ``W'W - T'T``.
+    """What the weighed products of B need: with W (N, 2, K) and T (M, 2 D, K) they are ``W'W - T'T``.
 
     Parameters
     ----------
     G
-        (N, 2, 6) of each point by its image's pose errors, each in its own standard deviation. Points are in
+        (N, 2, D) of each point by D errors of its image, each in its own standard deviation. Points are in
         the order of their images.
     own
         (N, 2, 2) covariance of what is each point's own.
@@ -425,18 +407,18 @@ def weigh_chain(
     image
         (N,) number of the image, from 0 to M - 1, none left out.
     rho
-        (M - 1, 6) correlation of what wanders from one image to the next, below 1.
+        (M - 1, D) correlation of what wanders from one image to the next, below 1.
     share
-        Of the variance of pose errors that wanders.
+        (D,) of the variance of these errors that wanders; the rest is each image's own.
 
     Returns
     -------
     W, T, logarithm of the determinant of the covariance
     """
-    N, K, M = B.shape[0], B.shape[2], rho.shape[0] + 1
-    W, T = np.empty((N, 2, K)), np.zeros((M, 12, K))
-    information = np.zeros((M, 6, 6))
-    g0, g1 = np.empty(6), np.empty(6)
+    N, K, M, D = B.shape[0], B.shape[2], rho.shape[0] + 1, G.shape[2]
+    W, T = np.empty((N, 2, K)), np.zeros((M, 2 * D, K))
+    information = np.zeros((M, D, D))
+    g0, g1 = np.empty(D), np.empty(D)
     logarithm = 0.0
     for i in range(N):
         a = np.sqrt(own[i, 0, 0])
@@ -444,50 +426,63 @@ def weigh_chain(
         d = np.sqrt(own[i, 1, 1] - b * b)
         logarithm += 2 * np.log(a * d)
         m = image[i]
-        for j in range(6):
+        for j in range(D):
             g0[j] = G[i, 0, j] / a
             g1[j] = (G[i, 1, j] - b * g0[j]) / d
         for c in range(K):
             W[i, 0, c] = B[i, 0, c] / a
             W[i, 1, c] = (B[i, 1, c] - b * W[i, 0, c]) / d
-        for j in range(6):
-            for k in range(6):
+        for j in range(D):
+            if g0[j] == 0.0 and g1[j] == 0.0:
+                continue
+            for k in range(D):
                 information[m, j, k] += g0[j] * g0[k] + g1[j] * g1[k]
             for c in range(K):
                 T[m, j, c] += g0[j] * W[i, 0, c] + g1[j] * W[i, 1, c]
     # Each image's own part first: what is left over of its points then says something of what wanders.
-    A, left, before = np.empty((6, 6)), np.empty((6, 6)), np.zeros((6, 6))
-    carried = np.zeros((6, K))
+    wanders, stays = np.sqrt(share), np.sqrt(1 - share)
+    A, across, left, before = np.empty((D, D)), np.empty((D, D)), np.empty((D, D)), np.zeros((D, D))
+    seen, carried = np.empty((D, K)), np.zeros((D, K))
     for m in range(M):
-        for j in range(6):
-            for k in range(6):
-                A[j, k] = (1 - share) * information[m, j, k]
-                left[j, k] = share * information[m, j, k]
+        for j in range(D):
+            for k in range(D):
+                across[j, k] = stays[j] * information[m, j, k]
+                A[j, k] = across[j, k] * stays[k]
             A[j, j] += 1.0
+            for c in range(K):
+                seen[j, c] = stays[j] * T[m, j, c]
         logarithm += _factorise(A)
-        seen = T[m, :6].copy()
+        _forward(A, across)
         _forward(A, seen)
-        T[m, 6:] = np.sqrt(share) * seen
-        T[m, :6] = np.sqrt(1 - share) * seen
-        _backward(A, T[m, 6:])
-        _forward(A, left)
-        _backward(A, left)
-        for j in range(6):
+        for j in range(D):
+            for k in range(j + 1):
+                value = information[m, j, k]
+                for i in range(D):
+                    value -= across[i, j] * across[i, k]
+                left[j, k] = wanders[j] * wanders[k] * value
+                left[k, j] = left[j, k]
+            for c in range(K):
+                rest = T[m, j, c]
+                for i in range(D):
+                    rest -= across[i, j] * seen[i, c]
+                T[m, D + j, c] = wanders[j] * rest
+        T[m, :D] = seen
+        for j in range(D):
             come = 1 / (1 - rho[m - 1, j] ** 2) if m > 0 else 1.0
             go = rho[m, j] ** 2 / (1 - rho[m, j] ** 2) if m < M - 1 else 0.0
             left[j, j] += come + go
             if m > 0:
                 q = rho[m - 1, j] / (1 - rho[m - 1, j] ** 2)
                 logarithm += np.log(1 - rho[m - 1, j] ** 2)
-                for k in range(6):
+                for k in range(D):
                     left[j, k] -= q * before[j, k] * rho[m - 1, k] / (1 - rho[m - 1, k] ** 2)
                 for c in range(K):
-                    T[m, 6 + j, c] += q * carried[j, c]
+                    T[m, D + j, c] += q * carried[j, c]
         logarithm += _factorise(left)
-        _forward(left, T[m, 6:])
-        carried[:] = T[m, 6:]
+        _forward(left, T[m, D:])
+        carried[:] = T[m, D:]
         _backward(left, carried)
-        before[:] = np.eye(6)
+        before[:] = np.eye(D)
         _forward(left, before)
         _backward(left, before)
     return W, T, logarithm

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.geometry.compilation import announced, compiled
-from wildlab.geometry.georeference import BELOW, HIT, MISSED, NO_DATA, NOT_KNOWN
+from wildlab.geometry.rays import BELOW, HIT, MISSED, NO_DATA, NOT_KNOWN
 
 
 @compiled
