@@ -8,19 +8,13 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-#: Rooms that import what they offer when it is asked for.
-LAZY = (
-    "wildlab",
-    "wildlab.evaluation",
-    "wildlab.flight",
-    "wildlab.reporting",
-)
-#: Rooms whose names are all documented, with parameters, what comes back, and an example where one helps.
-DOCUMENTED = (*LAZY, "wildlab.tracking.particles")
+#: What offers names, all of them documented, with parameters and what comes back.
+DOCUMENTED = ("wildlab", "wildlab.tracking.particles")
 #: Rooms whose examples are run.
 WITH_EXAMPLES = (
     *DOCUMENTED,
     *("wildlab.geometry", "wildlab.navigation", "wildlab.tracking", "wildlab.simulation"),
+    *("wildlab.evaluation", "wildlab.flight", "wildlab.reporting"),
     *("wildlab.analysis", "wildlab.detection", "wildlab.planning"),
     *("wildlab.api", "wildlab.sharing"),
 )

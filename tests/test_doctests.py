@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import doctest
 import importlib
+import inspect
 import pkgutil
 from types import ModuleType
 from typing import get_origin
@@ -37,6 +38,17 @@ def test_examples_come_out(room):
     for name in modules_of(room):
         failures, said = run_examples(importlib.import_module(name))
         assert failures == 0, said
+
+
+@pytest.mark.parametrize("room", ["geometry", "planning", "detection", "api", "sharing"])
+def test_a_docstring_that_lists_parameters_lists_all(room):
+    found = []
+    for name in modules_of(f"wildlab.{room}"):
+        for key, thing in vars(importlib.import_module(name)).items():
+            own = inspect.isfunction(thing) and thing.__module__ == name and not key.startswith("_")
+            if own and "\nParameters\n" in (inspect.getdoc(thing) or ""):
+                found += [one for one in lacking(f"{name}.{key}", thing) if one.endswith("not described")]
+    assert found == []
 
 
 @pytest.mark.parametrize("room", DOCUMENTED)

@@ -18,8 +18,7 @@ from bs4 import BeautifulSoup
 from tests.notebooks import write
 from wildlab.errors import WildlabError
 from wildlab.paths import NOTEBOOKS, ROOT
-from wildlab.reporting import new_figure, with_alt
-from wildlab.reporting.figures import FULL_SIZE, WIDTH
+from wildlab.reporting.figures import FULL_SIZE, WIDTH, new_figure, with_alt
 from wildlab.reporting.notebook_pages import tutorial_page
 from wildlab.runner import tutorials
 

@@ -1,7 +1,7 @@
 """Names that a package offers and imports only when they are asked for (PEP 562).
 
-``import wildlab.flight`` then costs nothing of what reads Parquet or checks recipes, and a room that is not
-needed is not loaded. The package lists its names twice: in ``__all__``, and under ``TYPE_CHECKING`` with
+``import wildlab`` then costs nothing of what reads Parquet or checks recipes, and a room that is not needed
+is not loaded. The package lists its names twice: in ``__all__``, and under ``TYPE_CHECKING`` with
 where they come from, for type checkers, editors, and this module. A test holds them against each other.
 """
 
@@ -31,9 +31,9 @@ def offer(package: str, folders: Sequence[str] = ()) -> tuple[Callable[[str], An
 
     Examples
     --------
-    >>> get, names = offer("wildlab.flight")
-    >>> get("Finding").__name__
-    'Finding'
+    >>> get, names = offer("wildlab")
+    >>> get("simulate").__name__
+    'simulate'
     """
     home = _promised(Path(str(sys.modules[package].__file__)))
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest, ttest_1samp
 
-from wildlab.evaluation import mean_interval, mean_share_interval, share_interval
+from wildlab.evaluation.intervals import mean_interval, mean_share_interval, share_interval
 
 
 @pytest.mark.parametrize("probability", [0.5, 0.95])

@@ -5,8 +5,8 @@ import pytest
 from scipy.stats import binom, ttest_rel
 
 from wildlab.errors import WildlabError
-from wildlab.evaluation import share_interval
 from wildlab.evaluation import shares as s
+from wildlab.evaluation.intervals import share_interval
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from wildlab.errors import WildlabError
-from wildlab.evaluation import share_interval
+from wildlab.evaluation.intervals import share_interval
 from wildlab.evaluation.shares import UNDECIDABLE, Check
 from wildlab.reporting.published import judge
 from wildlab.reporting.report import Report, open_report

@@ -576,7 +576,7 @@ def tutorial_page(notebook: nbformat.NotebookNode, *, name: str, footer: str = "
     Parameters
     ----------
     notebook
-        Executed, its figures shown by `wildlab.reporting.with_alt`.
+        Executed, its figures shown by `wildlab.reporting.figures.with_alt`.
     name
         Of its file, without ending.
     footer

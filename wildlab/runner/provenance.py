@@ -28,7 +28,7 @@ from wildlab.paths import LOCK, ROOT
 from wildlab.reporting.notebook_pages import ALERT
 from wildlab.reporting.text import escape, render
 from wildlab.runner.seeds import PACKAGES, SeedWork, package_version, read_seed, seed_digest
-from wildlab.runner.status import AGAIN, BEFORE_DIGESTS, FILES, STATUS, has_digests, misfits
+from wildlab.runner.status import AGAIN, FILES, STATUS, misfits
 
 #: The packages whose version can move a number, or how it is shown.
 SHOWN_BY = (*PACKAGES, "matplotlib", "papermill")
@@ -262,9 +262,9 @@ def verify_report(folder: Path, flight: Path | None = None, raw: Path | None = N
         status = None
     if not isinstance(status, dict):
         raise WildlabError("there is no report that is done here", "name a folder reports/NAME", file=folder)
-    if not has_digests(status):
-        old = WildlabError("the report has no digests", BEFORE_DIGESTS, file=folder / STATUS, field=FILES)
-        return Verification((old,), (), ())
+    if FILES not in status:
+        none = WildlabError("the report has no digests", AGAIN, file=folder / STATUS, field=FILES)
+        return Verification((none,), (), ())
     found = misfits(folder, status)
     checked = [f"{len(status.get(FILES) or ())} files of the report"]
     unchecked: list[str] = []

@@ -32,8 +32,6 @@ FILES, OWN = "files", "digest"
 #: What a run leaves and others put there later, too.
 _LATER = frozenset({"replay.html"})
 AGAIN = "make the report again, or take the file from a copy of it"
-#: What is said of a report that was written before there were digests.
-BEFORE_DIGESTS = "made before digests; run again"
 
 
 def seal(folder: Path, status: Mapping[str, Any], names: tuple[str, ...]) -> None:
@@ -66,7 +64,7 @@ def misfits(folder: Path, status: Mapping[str, Any]) -> list[WildlabError]:
     status
         Its ``status.json``; one without digests says nothing of the files.
     """
-    if not has_digests(status):
+    if FILES not in status and OWN not in status:  # one turned bit cannot take both keys away
         return []
     files = status.get(FILES)
     content = {key: value for key, value in status.items() if key != OWN}
@@ -83,11 +81,6 @@ def misfits(folder: Path, status: Mapping[str, Any]) -> list[WildlabError]:
             )
             found.append(WildlabError(problem, AGAIN, file=path, field=f"{FILES}.{name}"))
     return found
-
-
-def has_digests(status: Mapping[str, Any]) -> bool:
-    """Whether a report was written with digests; one turned bit cannot take both keys away."""
-    return FILES in status or OWN in status
 
 
 def read_status(folder: Path) -> dict[str, Any]:
@@ -129,8 +122,6 @@ def study_status(study: StudyEntry, reports: Path, published: Path = FOLDER) -> 
         # What cannot be read, or is of another study, must not count as this one's full numbers.
         if metrics is None or metrics["study"] != study.name or (status.get("first_look") and not look):
             state, reason, metrics = "broken off", "", None
-    if state == "done" and not has_digests(status):
-        reason = BEFORE_DIGESTS
     if state == "done" and look:
         state = FIRST_LOOK
     return StudyStatus(

@@ -33,7 +33,7 @@ from wildlab.runner.provenance import (
     same_flight,
 )
 from wildlab.runner.scheduling import Outcome
-from wildlab.runner.status import BEFORE_DIGESTS, has_digests, read_status
+from wildlab.runner.status import read_status
 from wildlab.sharing.generalisation import Generalised, Names, neutral_learnt, neutral_settings
 from wildlab.sharing.tiers import describe
 from wildlab.simulation.parameters import load_twin, twin_names
@@ -237,8 +237,6 @@ def _with_siblings(source: Source, studies: dict[str, StudyEntry]) -> tuple[Sour
             parameters |= one.parameters
         else:
             left_out.append(f"{folder}: it was made from other tables.")
-    old = ", ".join(folder.name for folder in folders if not has_digests(read_status(folder)))
-    left_out += [f"{old}: {BEFORE_DIGESTS}."] if old else []
     return Source(source.name, tuple(folders), True, source.flight, parameters), left_out
 
 
