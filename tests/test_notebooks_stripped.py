@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import ast
+import importlib
 import json
 import re
 import shutil
 import subprocess
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -76,3 +78,16 @@ def test_tracked_notebooks():
         if (faults := problems(json.loads(path.read_text(encoding="utf-8")), path.parent.name == "tutorials"))
     }
     assert not found
+
+
+def test_what_notebooks_import_is_there():
+    missing = []
+    for path in tracked_notebooks(paths.ROOT):
+        cells = [one for one in json.loads(path.read_text())["cells"] if one["cell_type"] == "code"]
+        for node in ast.walk(ast.parse("\n".join(map(text_of, cells)))):
+            if isinstance(node, ast.ImportFrom) and str(node.module).startswith("wildlab"):
+                home = importlib.import_module(str(node.module))
+                names = [one.name for one in node.names if not hasattr(home, one.name)]
+                # A module of a room is no attribute before it is imported.
+                missing += [one for one in names if find_spec(f"{node.module}.{one}") is None]
+    assert missing == []
