@@ -112,3 +112,12 @@ def test_early_receipts_of_a_short_log_are_outliers():
     assert abs(fit.rate - 1) < 1e-4
     assert not fit.used[20]
     assert abs(fit.to_reference(305.0) - UTC - 305) < 0.01
+
+
+@pytest.mark.parametrize("early", [0.05, 0.15, 0.4, 2.0])
+def test_one_early_stamp_among_late_ones_moves_nothing(early):
+    for seed in range(5):
+        rng, own, true, rate = clocks(seed)
+        stamps = true + rng.exponential(0.1, len(own))
+        stamps[len(own) // 3] = true[len(own) // 3] - early
+        assert_as_promised(fit_clock(own, stamps, late=True), own, true, rate)
