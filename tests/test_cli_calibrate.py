@@ -18,6 +18,7 @@ from wildlab.analysis.tracks.tracker import read_inputs
 from wildlab.errors import WildlabError
 from wildlab.evaluation.intervals import Interval
 from wildlab.flight.calibration_files import parse_learnt, read_learnt, write_calibration
+from wildlab.flight.checks.check import find
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import load_flight, save_flight
 from wildlab.paths import DATA
@@ -172,3 +173,15 @@ def test_poses_that_a_check_doubts_teach_only_when_asked_to(tmp_path, monkeypatc
     call = ("calibrate", tmp_path / "wrong", "--out", tmp_path / "c.toml")
     assert "--despite-warnings" in refuse(*call)
     succeed(*call, "--despite-warnings")
+
+
+def test_a_clock_that_a_check_finds_off_is_what_is_to_be_learnt(tmp_path, monkeypatch):
+    flight = simulate_sound_flight("fixed wing", 1)
+    frames = flight.table("frames")
+    late = replace(flight, tables={**flight.tables, "frames": frames.assign(time_s=frames["time_s"] + 2.0)})
+    assert {("clock of the camera",)} <= {one.causes for one in find(late, plain=False)}
+    save_flight(late, tmp_path / "late")
+    gain = SimpleNamespace(gain=Interval(np.nan, np.nan, np.nan))
+    winner = SimpleNamespace(causes=(), gain=gain)
+    learn(monkeypatch, winner=winner, models=[winner], ranked=SimpleNamespace(rivals=()))
+    succeed("calibrate", tmp_path / "late", "--out", tmp_path / "c.toml")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
@@ -14,9 +15,10 @@ from hypothesis import strategies as some
 from tests.sharing.canary import HERE, canary
 from tests.sharing.spelt import DATES, LATITUDE, LEAKS, LONGITUDE, NAME, NUMBER, SPELLINGS, WHEN, secrets
 from wildlab.geometry.frames import normal_gravity
+from wildlab.paths import DATA
 from wildlab.sharing.generalisation import generalise
 from wildlab.sharing.recomputation import Source
-from wildlab.sharing.scan import Secrets, SecretSearch, flight_secrets
+from wildlab.sharing.scan import Secrets, SecretSearch, flight_secrets, search_limits
 from wildlab.sharing.tiers import treatment_of
 
 # Off the equator and the meridian, where a coordinate is a small number like any other.
@@ -157,3 +159,13 @@ def test_what_is_known_of_a_flight_is_looked_for():
     ):  # fmt: skip
         assert found(text, known) == {kind}, text
     assert not found("g = 9.80665 m/s2, 24.9 S, 31.5 E, September 2023", known)
+
+
+@pytest.mark.parametrize("language", ["en", "nb", "sv"])
+def test_words_of_the_sheets_are_no_names_of_a_flight_and_are_told_to_the_sender(language):
+    """A terrain called dem.tif is no secret that "av dem" gives away."""
+    sheet = (DATA / "messages" / "edition" / f"{language}.toml").read_text(encoding="utf-8")
+    words = ("maps/dem.tif", *re.findall(r"[^\W\d_]{5,}", sheet))
+    assert SecretSearch(Secrets(words=words)).scan({"sheet.html": sheet}) == []
+    assert any("dem" in line for line in search_limits(Secrets(words=("dem",))))
+    assert SecretSearch(Secrets(words=("Skukuza",))).scan({"sheet.html": f"{sheet} Skukuza"})

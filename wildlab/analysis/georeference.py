@@ -483,8 +483,9 @@ def _degrees(flight: Flight, place: Array) -> Array:
 
 
 def _rings(placed: pd.DataFrame) -> Array:
-    """(N, CORNERS + 1, 3) m in n, closed, the ellipses at the heights of their points."""
-    turn = np.linspace(0, 2 * np.pi, CORNERS + 1)
+    """(N, CORNERS + 1, 3) m in n, closed, the ellipses at the heights of their points; counterclockwise on a
+    map, as RFC 7946 has outer rings."""
+    turn = np.linspace(0, -2 * np.pi, CORNERS + 1)
     along = placed["long_90_m"].to_numpy(float)[:, None] * np.cos(turn)
     across = placed["short_90_m"].to_numpy(float)[:, None] * np.sin(turn)
     bearing = np.radians(placed["bearing_deg"].to_numpy(float))[:, None]

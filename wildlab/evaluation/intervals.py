@@ -230,7 +230,8 @@ def time_blocks(order: ArrayLike, seconds: bool) -> Labels:
     """Number of the block (N,) that each point belongs to, in time order.
 
     Where there are times and the flight lasts for six blocks of a minute: by the clock. Otherwise by the
-    number of images: three to a block, as far as that leaves six blocks.
+    number of images: three to a block, as far as that leaves six blocks. No more than `MOST` blocks, which
+    are longer where that takes it.
 
     Parameters
     ----------

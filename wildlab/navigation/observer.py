@@ -328,7 +328,7 @@ def field_reference(times: ArrayLike, field_b: ArrayLike, field_n: ArrayLike) ->
     field_b
         (N, 3) in b, of any unit, calibrated for hard and soft iron; rows with NaN are left out.
     field_n
-        The field as it is there, (3,) in n, of any unit; see :func:`~wildlab.navigation.earth_field`.
+        The field as it is there, (3,) in n, of any unit; see `wildlab.navigation.aiding.earth_field`.
 
     Returns
     -------

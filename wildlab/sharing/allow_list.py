@@ -99,6 +99,13 @@ def own_vocabulary() -> frozenset[str]:
 
 
 @cache
+def sheet_words() -> frozenset[str]:
+    """The words of the sheets for partners, in all their languages."""
+    texts = [path.read_text(encoding="utf-8") for path in (DATA / "messages" / "edition").glob("*.toml")]
+    return frozenset(re.findall(r"[^\W_]+", "\n".join(texts).casefold()))
+
+
+@cache
 def _own_tokens() -> frozenset[str]:
     """The same, runs of letters alone, names with _, and whatever short thing has a digit: ``H 7.2.2``."""
     text = own_text()

@@ -32,7 +32,7 @@ from wildlab.flight.store import Flight
 from wildlab.flight.terrain import undulation
 from wildlab.geometry.frames import Array, ned_to_geodetic, normal_gravity
 from wildlab.paths import ROOT
-from wildlab.sharing.allow_list import DATA_ADDRESS, FORMS, own_phrases, own_vocabulary
+from wildlab.sharing.allow_list import DATA_ADDRESS, FORMS, own_phrases, own_vocabulary, sheet_words
 from wildlab.sharing.generalisation import Generalised, first_stamp, names_in, new_origin
 from wildlab.sharing.recomputation import Source
 from wildlab.sharing.tiers import Treatment, describe
@@ -422,14 +422,16 @@ def phrases_of(words: Iterable[str]) -> tuple[list[tuple[str, ...]], list[str]]:
                 elif one == piece and phrase:
                     skipped[one] = None
             telling = [part for part in parts_of(stem) if len(part) >= LONG and not part.isdigit()]
-            wanted.update({(part,): None for part in telling if part not in own_vocabulary()})
+            wanted.update({(part,): None for part in telling if part not in own_vocabulary() | sheet_words()})
     return list(wanted), list(skipped)
 
 
 def _can_be_sought(phrase: tuple[str, ...]) -> bool:
-    """Not what is too short, a short number, or a phrase of wildlab's own reports: it stands everywhere."""
+    """Not what is too short, a short number, a phrase of wildlab's own reports, or a word of its sheets: it
+    stands everywhere."""
     joined = "".join(phrase)
     ours = all(part in own_vocabulary() for part in phrase) and f" {' '.join(phrase)} " in own_phrases()
+    ours |= len(phrase) == 1 and joined in sheet_words()
     return len(joined) >= (6 if joined.isdigit() else SHORTEST) and not ours
 
 
