@@ -278,27 +278,31 @@ def test_it_is_the_mean_given_all_measurements(motion, seed):
         np.testing.assert_allclose(found.P, P, atol=1e-6)
 
 
+@pytest.mark.parametrize("together", [1, 3])
 @pytest.mark.parametrize("time", [0.0, 5.0, np.inf])
-def test_its_covariance_is_its_errors_with_considered_ones(time):
-    """The smoother is linear in what is random: its true covariance, one source of randomness at a time."""
+def test_its_covariance_is_its_errors_with_considered_ones(time, together):
+    """The smoother is linear in what is random: its true covariance, one source of randomness at a time; of
+    one row at an instant or several, better and worse."""
     N, bias = 12, 2.0
-    times = np.arange(1.0, N + 1)
+    times = np.arange(N) // together + 1.0
     pose = consider(
         {"platform_north": bias, "platform_east": bias}, {"platform_north": time, "platform_east": time}
     )
-    sensor, R = measured_from([0.0, 0.0]), np.eye(2)
+    sd = np.array([1.0, 0.2, 3.0])[np.arange(N) % together]
+    sensor, R = measured_from([0.0, 0.0]), sd[:, None, None] ** 2 * np.eye(2)
     start = Start(0.0, np.zeros(4), np.diag([9.0, 9.0, 1.0, 1.0]))
-    F, Q = WA(1.0)
-    left = float(np.exp(-1 / time)) if time else 0.0
     # A column for each source: of the state 4 and of the bias 2, then in each row motion 4, noise 2, bias 2.
     unit = np.eye(6 + 8 * N)
     x, o, rest = np.sqrt(start.P) @ unit[:4], bias * unit[4:6], unit[6:].reshape(N, 8, -1)
     truth, z = [], []
     for k in range(N):
-        x = F @ x + np.linalg.cholesky(Q) @ rest[k, :4]
+        dt = times[k] - (times[k - 1] if k else 0.0)
+        F, Q = WA(dt)
+        left = float(np.exp(-dt / time)) if time else 0.0
+        x = F @ x + (np.linalg.cholesky(Q) @ rest[k, :4] if dt else 0.0)
         o = left * o + bias * np.sqrt(1 - left**2) * rest[k, 6:] if k else o
         truth.append(x)
-        z.append(x[:2] - o + rest[k, 4:6])
+        z.append(x[:2] - o + sd[k] * rest[k, 4:6])
     found = [run_smoothed(times, one, R, sensor, WA, start, pose=pose) for one in np.moveaxis(z, -1, 0)]
     e = np.array(truth) - np.stack([one.x for one in found], axis=-1)
     np.testing.assert_allclose(found[0].P, e @ np.swapaxes(e, 1, 2), atol=1e-8)

@@ -25,8 +25,6 @@ more than there was, where mixtures grow.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import reduce
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -163,8 +161,9 @@ class Track(NamedTuple):
         (N,) index of the detection that was nearest, -1 where there was none to choose from.
     limited
         (N,) bool: the Schmidt filter's cross-covariance had to be shortened here (`kalman.limit_cross`).
-    C
-        (N, n, k) after each row, with the k errors that `run_filter` considered.
+    C, x_after, P_after
+        (N, n, k) after each row, with the k errors that `run_filter` considered; and x (N, n) and P (N, n, n)
+        there: rows of one instant differ, where ``x`` and ``P`` have what all of them tell.
     """
 
     times: Array
@@ -177,6 +176,8 @@ class Track(NamedTuple):
     chosen: NDArray[np.int64]
     limited: NDArray[np.bool_]
     C: Array = np.empty((0, 0, 0))
+    x_after: Array = np.empty((0, 0))
+    P_after: Array = np.empty((0, 0, 0))
 
 
 class FilterInputs(NamedTuple):
@@ -519,7 +520,19 @@ def run_filter(
         last, x_last = row, done.x
         return now, done.x, done.P
 
-    return step_through(given, start, motion, step)._replace(C=crosses)
+    moments = np.full((len(given.times), n), np.nan), np.full((len(given.times), n, n), np.nan)
+    if start.row >= 0:
+        moments[0][start.row], moments[1][start.row] = start.x, start.P
+
+    def kept_step(row: int, state: State, track: Track) -> State | None:
+        done = step(row, state, track)
+        if done is not None:
+            moments[0][row], moments[1][row] = done[1:]
+        return done
+
+    return step_through(given, start, motion, kept_step)._replace(
+        C=crosses, x_after=moments[0], P_after=moments[1]
+    )
 
 
 #: Variances below this share of those that there were count as zero: rounding.
@@ -567,17 +580,16 @@ def smooth(track: Track, motion: Motion, errors: Errors | None = None) -> Track:
             "give it at the measurements' times", field="track",
         )  # fmt: skip
     x, P = track.x.copy(), track.P.copy()
-    begun = np.flatnonzero(np.isfinite(x).all(axis=1))
-    times, instant = np.unique(track.times[begun], return_inverse=True)
-    # Of several rows at an instant the last has what all of them tell.
-    rows = begun[np.searchsorted(track.times[begun], times, side="right") - 1]
+    x_rows, P_rows = (x, P) if errors is None else (track.x_after, track.P_after)
+    rows = np.flatnonzero(np.isfinite(x_rows).all(axis=1))
+    times = track.times[rows]
+    last = np.searchsorted(times, times, side="right") - 1  # of its instant
     C, of_rows = np.zeros((len(rows), x.shape[1], 0)), lasting_errors((), len(rows))
     if errors is not None:
-        phi = [reduce(np.matmul, errors.phi[a + 1 : b + 1][::-1]) for a, b in pairwise([-1, *rows])]
         C, known = track.C[rows], known_before(errors.covariance)
-        of_rows = errors._replace(covariance=known[rows], phi=np.array(phi))
-    smoothed = smooth_moments(times, x[rows], P[rows], C, motion, of_rows)
-    x[begun], P[begun] = (part[instant] for part in smoothed)
+        of_rows = errors._replace(covariance=known[rows], phi=errors.phi[rows])
+    smoothed = smooth_moments(times, x_rows[rows], P_rows[rows], C, motion, of_rows)
+    x[rows], P[rows] = (part[last] for part in smoothed)
     return track._replace(x=x, P=P)
 
 
