@@ -330,8 +330,8 @@ def caption_of(numbers: Sequence[Number]) -> str:
     return " ".join([*said, texts["signs"], fill(texts["sources"], {}, {"sources": sources})])
 
 
-#: What the axis of marks says, by ratio; what lies beyond its ends is drawn at them.
-TICKS = {1 / 8: "⅛", 1 / 4: "¼", 1 / 2: "½", 1.0: "published", 2.0: "2×", 4.0: "4×", 8.0: "8×"}
+#: What the axis of marks says, in words; what lies beyond its ends is drawn at them.
+ENDS = ("⅛", "published", "8×")
 #: The margin of most published numbers, the size of an error; it is shaded.
 MARGIN = KINDS["error size"].factor
 #: The axis of marks, and its room above and below, in units of the drawing.
@@ -363,12 +363,8 @@ def marks_plot(numbers: Iterable[Number], *, alt: str) -> Markup:
         alt=alt,
         width=MARKS_WIDTH,
         height=MARKS_HEIGHT,
-        axis=[("one" if ratio == 1 else "axis", at(ratio)) for ratio in TICKS],
-        ticks=[
-            (100 * at(ratio) / MARKS_WIDTH, one, ratio in (1 / 2, 2.0))
-            for ratio, one in TICKS.items()
-            if ratio not in (1 / 4, 4.0)
-        ],
+        axis=[("one" if power == 0 else "axis", at(2.0**power)) for power in range(-3, 4)],
+        ticks=ENDS,
         near=(at(1 / MARGIN), at(MARGIN)),
         marks=[
             (at(one.ratio or 0.0), MARKS_HEIGHT / 2 + reach * (2 * (k * 0.618034 % 1) - 1), _mark(one))
