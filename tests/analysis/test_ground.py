@@ -9,7 +9,8 @@ import pandas as pd
 from scipy.ndimage import gaussian_filter
 
 from tests.analysis.building import manifest_of, poses_table, surveyed
-from wildlab.analysis.georeference import georeference, observe
+from wildlab.analysis.accuracy import judge_accuracy
+from wildlab.analysis.georeference import georeference, observe, truth_deviations
 from wildlab.analysis.tracks.pixels import read_pixels
 from wildlab.flight.checks.check import check_flight
 from wildlab.flight.store import Flight
@@ -17,6 +18,7 @@ from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix, rotation_vector_to_matrix
 from wildlab.geometry.georeference import Terrain, pixels_to_terrain
+from wildlab.simulation.twins import simulate_twin
 
 MANIFEST = manifest_of(
     Camera(640, 512, 700.0, 700.0, 320.0, 256.0),
@@ -105,3 +107,18 @@ def test_a_check_holds_the_survey_against_the_map():
     holed[60:] = np.nan
     assert findings(holed, "a hole") == ["warning"]
     assert findings(holed, "beyond the border") == []
+
+
+def test_what_the_truth_states_of_itself_counts_for_the_ellipses():
+    """By the median of its rows, of which one may be of a bad fix."""
+    flight = simulate_twin("large-ship", 1)
+    found = {}
+    for sd, worst in ((0.0, 0.0), (100.0, 1e4)):
+        truth = flight.table("truth").assign(sd_horizontal_m=sd)
+        truth.loc[truth.index[0], "sd_horizontal_m"] = worst
+        observations = observe(replace(flight, tables={**flight.tables, "truth": truth}), "autopilot")
+        found[sd] = judge_accuracy(observations, np.random.default_rng(0)).ellipses
+    stated = truth_deviations(replace(flight, tables={**flight.tables, "truth": truth}), truth["target_id"])
+    assert set(stated) == {100.0}
+    assert found[0.0].coverage.estimate < 0.9 and found[0.0].factor.estimate > 1
+    assert found[100.0].coverage.estimate == 1 and found[100.0].factor.estimate < 0.5
