@@ -109,7 +109,8 @@ def mekf(ready: MekfInputs, earth: Array, patience: float) -> tuple[Array, Array
     )  # fmt: skip
     x, P = ready.state, ready.covariance
     n = len(P)
-    states, covariances = np.empty((line.rows, n + 1)), np.empty((line.rows, n, n))
+    rows = line.row_of_node.max() + 1
+    states, covariances = np.empty((rows, n + 1)), np.empty((rows, n, n))
     nis, verdicts = np.full(len(measured.node), np.nan), np.zeros(len(measured.node), np.int64)
     rejected_since = np.full(2, np.nan)
     event = 0

@@ -39,7 +39,7 @@ def observer(ready: ObserverInputs) -> Array:
     p, v, xi = ready.x[:3], ready.x[3:6], ready.x[6:]
     scale = np.repeat([1.0, theta, theta**2], 3)
     held, held_until, event, eye = np.zeros(3), -np.inf, 0, np.eye(3)
-    out = np.full((line.rows, 16), np.nan)
+    out = np.full((line.row_of_node.max() + 1, 16), np.nan)
 
     def directions(f: Array) -> tuple[Array, Array]:
         return unit(f), unit(np.clip(attitude.apply(f) + xi, -limit, limit))

@@ -142,7 +142,7 @@ class Timeline(NamedTuple):
     """Nodes of the integration: (K,) times, (K, 3) specific force and rate there.
 
     ``gap`` (K,) is the length (s) of the gap in which the step that ends at the node lies, 0 where in none.
-    ``row_of_node`` (K,) is the output row that the node fills, or -1; there are ``rows`` of them.
+    ``row_of_node`` (K,) is the output row that the node fills, or -1.
     """
 
     times: Array
@@ -150,7 +150,6 @@ class Timeline(NamedTuple):
     w: Array
     gap: Array
     row_of_node: Integers
-    rows: int
 
 
 class Measurements(NamedTuple):
@@ -229,7 +228,7 @@ def lay_out(imu: ImuSamples, start: float, others: ArrayLike, wanted: ArrayLike,
     rows = np.full(len(times), -1, np.int64)
     inside = np.flatnonzero((wanted >= start) & (wanted <= end))
     rows[np.searchsorted(times, wanted[inside])] = inside
-    return Timeline(times, f, w, np.where(length > max_gap, length, 0.0), rows, len(wanted))
+    return Timeline(times, f, w, np.where(length > max_gap, length, 0.0), rows)
 
 
 class DeadReckoning(NamedTuple):
