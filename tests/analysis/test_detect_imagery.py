@@ -27,7 +27,7 @@ def judged(samples: list[Sample], method: str, thresholds: object) -> Rates:
     counts = []
     for one in samples:
         found = detect_frame(one.frame, method, thresholds)
-        counts.append(match(boxes(found), one.boxes, None, one.ignore).counts)
+        counts.append(match(boxes(found), one.boxes, one.ignore).counts)
     return rates(np.array(counts), [one.group for one in samples])
 
 

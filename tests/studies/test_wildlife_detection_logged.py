@@ -34,7 +34,7 @@ def judged(samples: list[Sample], thresholds: Warm) -> Rates:
     for one in samples:
         found = find_warm(one.frame.image, one.frame.valid, small)
         boxes = np.concatenate([found.uv - found.box[:, 2:] / 2, found.box[:, 2:]], axis=1)
-        counts.append(match(boxes, one.boxes, None, one.ignore).counts)
+        counts.append(match(boxes, one.boxes, one.ignore).counts)
     return rates(np.array(counts))
 
 
