@@ -49,7 +49,7 @@ def test_the_front_pages_own_commands_run(tmp_path, monkeypatch):
     for line in (
         "simulate large-ship --out flights/trial",
         f"evaluate flights/trial --out {out}",
-        f"track flights/trial --out {out}/trial-tracking",
+        f"track flights/trial --out {out}/trial-tracking --overwrite",
         f"replay flights/trial --out {out}/trial-replay",
         f"share {out}/trial",
     ):

@@ -84,6 +84,6 @@ def test_every_name_that_is_offered_has_its_place(reference, room):
 def test_the_first_page_opens_in_a_browser(reference, faults):
     index = (reference / "index.html").read_text(encoding="utf-8")
     assert all(f">{room}</a>" in index for room in DOCUMENTED if room.count(".") < 2)
-    for page in ("index.html", "wildlab.html", "wildlab/flight.html", "wildlab/analysis/tracks/tracker.html"):
+    for page in ("index.html", "wildlab.html", "wildlab/errors.html", "wildlab/analysis/tracks/tracker.html"):
         # The look of these pages is pdoc's.
         assert faults(reference / page, axe=False) == [], page

@@ -43,7 +43,7 @@ def hostile_report() -> Report:
     for width in (5.0, 9.0):
         fig, ax = new_figure(width, 3)
         ax.plot([0, 1], [0, 1])
-        report.figure(fig, name=f"figure-{width:.0f}", alt=HOSTILE, caption=HOSTILE)
+        report.figure(fig, name=f"figure-{width:.0f}", alt=HOSTILE, caption=HOSTILE, main=width < 6)
     wide = pd.DataFrame({HOSTILE: [HOSTILE, None], **{f"column {i}": [i, i / 3] for i in range(12)}})
     report.table(wide, caption=HOSTILE, fold=HOSTILE)
     formula = r"\epsilon_k = \tilde{x}_k^\top P_k^{-1} \tilde{x}_k " + "+ a_{k} b_{k} " * 30

@@ -264,7 +264,8 @@ def lower_line(x: Array, y: Array) -> tuple[float, float, float]:
     middle = A.mean(axis=0)
 
     def under(rows: Indices) -> Array:
-        return np.array(linprog(-middle, A[rows], y[rows], bounds=(None, None)).x)
+        aim = np.clip(middle, A[rows].min(axis=0), A[rows].max(axis=0))  # else it has no bound
+        return np.array(linprog(-aim, A[rows], y[rows], bounds=(None, None)).x, float)
 
     line = first = best = under(near)
     kept = near

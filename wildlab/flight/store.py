@@ -473,7 +473,7 @@ def _read(folder: Path, name: str, table: Table) -> pd.DataFrame:
         # ParquetFile, not read_table: the latter would read columns out of folder names such as "a=b".
         with parquet.ParquetFile(path) as stored:
             # What became a column of the table is let go of: ten hours of a sensor are half a gigabyte, once.
-            data = stored.read().to_pandas(ignore_metadata=True, split_blocks=True, self_destruct=True)
+            data = stored.read().to_pandas(ignore_metadata=True, self_destruct=True)
     except (arrow.ArrowException, OSError, ValueError) as error:
         first = (str(error).strip() or type(error).__name__).splitlines()[0]
         problem = f"is not a readable Parquet file ({first})"
