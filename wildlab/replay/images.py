@@ -88,8 +88,7 @@ def read_shots(
 
 def images_of(flight: Path | None) -> Path | None:
     """The folder of a flight's images, where it holds one."""
-    folder = None if flight is None else flight / "images"
-    return folder if folder is not None and folder.is_dir() else None
+    return flight / "images" if flight is not None and (flight / "images").is_dir() else None
 
 
 def frames_of(flight: Flight, ids: Sequence[object]) -> dict[int, NDArray[Any]]:

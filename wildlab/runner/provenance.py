@@ -124,8 +124,7 @@ def provenance_of_flight(folder: Path) -> dict[str, Any]:
         manifest = tomllib.loads((folder / "flight.toml").read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
         manifest = {}
-    parts = (part for part in folder.iterdir() if part.name != "images") if folder.is_dir() else ()
-    below = (path for part in parts for path in (part, *part.rglob("*")))
+    below = (path for path in folder.rglob("*") if not path.is_relative_to(folder / "images"))
     files = sorted(path for path in below if path.is_file() and not path.is_symlink())
     try:
         changed = manifest_changed(folder)
