@@ -74,6 +74,9 @@ def test_polygons_are_the_ellipses_of_ninety_per_cent(made):
         own = table.loc[[one["properties"]["detection_id"]]].reset_index()
         height = float(flight.manifest.origin.height_m - own["down_m"].iloc[0])
         lon, lat = np.radians(ring).T
+        # RFC 7946: outer rings run counterclockwise, east before north.
+        east, north = np.diff(ring, axis=0).T
+        assert (east[:-1] * north[1:] > north[:-1] * east[1:]).all()
         metres = geodetic_to_ned(lat, lon, height, flight.manifest.origin_tuple())
         off = metres[:, :2] - own[["north_m", "east_m"]].to_numpy()
         distance = np.einsum("ni,ij,nj->n", off, np.linalg.inv(covariances_of(own)[0]), off)

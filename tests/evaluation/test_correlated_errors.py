@@ -101,6 +101,16 @@ def test_a_constant_against_errors_that_wander_is_as_certain_as_its_interval_say
     assert wandering <= 2
 
 
+def test_degrees_of_freedom_are_those_of_a_variance_where_the_noise_is_white():
+    """Of 2 N residuals of one unknown variance and two constants 2 N - 2, as of Student's distribution."""
+    points = drawn_points(40)._replace(derivatives=np.zeros((160, 2, 6)), own=np.zeros((160, 2, 2)))
+    points = points._replace(pixel=np.tile(np.eye(2), (160, 1, 1)))
+    J, errors = np.tile(np.eye(2), (160, 1, 1)), np.random.default_rng(5).normal(0, 3.0, (160, 2))
+    found = estimate_wander(points, errors, J, {**SD, "pixel": 3.0})
+    freedom, each = degrees_of_freedom(J, np.ones(2), points, found)
+    assert [freedom, *each] == pytest.approx([318.0] * 3, rel=0.1)
+
+
 @pytest.mark.parametrize("every", [3.0, 0.0])
 def test_the_error_of_a_logged_place_wanders_with_that_of_logged_positions(every):
     """Against the dense covariance; two of three things move, and images may be taken at once."""
