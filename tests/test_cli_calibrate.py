@@ -161,6 +161,7 @@ def test_a_kept_calibration_moves_points_and_tracks_as_the_corrections_by_hand_d
         assert not np.allclose(R, logged[name].scans.poses.R_nc, atol=0.01)
 
 
+@pytest.mark.slow
 def test_poses_that_a_check_doubts_teach_only_when_asked_to(tmp_path, monkeypatch):
     """Roll and pitch exchanged: a warning, since the nose of an aircraft may point elsewhere."""
     flight = simulate_sound_flight("fixed wing", 1)
@@ -175,6 +176,7 @@ def test_poses_that_a_check_doubts_teach_only_when_asked_to(tmp_path, monkeypatc
     succeed(*call, "--despite-warnings")
 
 
+@pytest.mark.slow
 def test_a_clock_that_a_check_finds_off_is_what_is_to_be_learnt(tmp_path, monkeypatch):
     flight = simulate_sound_flight("fixed wing", 1)
     frames = flight.table("frames")

@@ -62,6 +62,7 @@ def test_known_points_tell_it_where_motion_does_not(motion, points, said, tmp_pa
     assert ("points" in told) == (told != "motion say so.")
 
 
+@pytest.mark.slow
 def test_what_a_kept_calibration_adds_is_not_set_again(tmp_path):
     late = LearntParameter(name="clock", value=0.3, low=0.2, high=0.4, unit="s")
     flight = simulate(Survey(images=12, clock_s=0.5))

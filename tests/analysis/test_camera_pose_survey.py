@@ -106,7 +106,12 @@ def write_survey(folder: Path, kind: str, pitch_deg: float) -> pd.DataFrame:
 
 @pytest.mark.parametrize(
     ("kind", "pitch_deg"),
-    [("tilt and heading", -90.0), ("roll, pitch and yaw", -50.0), ("uncertainty", -90.0), ("nothing", -90.0)],
+    [
+        ("tilt and heading", -90.0),
+        pytest.param("roll, pitch and yaw", -50.0, marks=pytest.mark.slow),
+        pytest.param("uncertainty", -90.0, marks=pytest.mark.slow),
+        pytest.param("nothing", -90.0, marks=pytest.mark.slow),
+    ],
 )
 def test_ellipses_through_import_and_georeference(tmp_path, kind, pitch_deg):
     marks = write_survey(tmp_path, kind, pitch_deg)

@@ -137,6 +137,7 @@ def test_a_track_ends_where_more_is_left_out_than_stated_and_not_before_a_gap(sh
     assert ends is not None and ends(1, 0, np.array([100.0, 0.0, 0.0, 0.0]), P) is right
 
 
+@pytest.mark.slow
 def test_a_target_at_rest_is_one_track_through_any_gap():
     """By a motion model without acceleration and speed, told or because its truth has no time."""
     scans, truth = watched()

@@ -82,7 +82,7 @@ def scenes(draw):
     return terrain, np.array([*at, -float(height.max() + rng.uniform(0.5, 25.0))])
 
 
-@settings(max_examples=12)
+@settings(max_examples=5)
 @given(scenes())
 def test_rays_in_steps_are_those_of_the_slow_twin(scene):
     terrain, p_nc = scene

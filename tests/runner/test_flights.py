@@ -108,7 +108,7 @@ def test_any_flight_folder_can_be_evaluated(tmp_path, make_flight):
     "cell",
     [
         pytest.param("report.save()", marks=pytest.mark.slow),
-        "raise RuntimeError(flight)",
+        pytest.param("raise RuntimeError(flight)", marks=pytest.mark.slow),
         # A folder beside the flight. A failure quotes this line: it must not hold the name looked for.
         "load_flight(flight[:-7] + 'monday')",
     ],
