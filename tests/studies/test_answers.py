@@ -385,14 +385,19 @@ ANSWERS: dict[str, list[Case]] = {
     "crossing-vessels": [
         (
             {"no-swap-with-features": HOLDS, "size-best": HOLDS, "looks/separation_size": 9.0},
-            ("swap-holds", "feature-size"),
+            ("swap-holds", "today-unknown", "feature-size"),
         ),
         (
-            {"no-swap-with-features": FAILS, "size-best": FAILS, "looks/separation_size": 1.0},
-            ("swap-fails", "feature-open"),
+            {
+                "no-swap-with-features": FAILS,
+                "size-best": FAILS,
+                "looks/separation_size": 1.0,
+                "mht/swapped_shared": 0.0,
+            },
+            ("swap-fails", "today", "feature-open"),
         ),
-        ({"no-swap-with-features": SPLIT}, ("swap-split", "feature-unknown")),
-        ({"no-swap-with-features": (UNDECIDED, 0.4, 1.0)}, ("swap-few", "feature-unknown")),
+        ({"no-swap-with-features": SPLIT}, ("swap-split", "today-unknown", "feature-unknown")),
+        ({"no-swap-with-features": (UNDECIDED, 0.4, 1.0)}, ("swap-few", "today-unknown", "feature-unknown")),
     ],
     "wildlife-tracking": [
         (tracked(4.0, 0.4) | HARD, ("known-overconfident", "lap-hard")),

@@ -48,7 +48,7 @@ def flown(flight):
     looks = photograph("crossing-vessels", 6, flight, 2)
     appearance = dressed(crossing, looks, 6)
     banks = {DISTANCE: run_bank(crossing.detections), FEATURES: run_bank(crossing.detections, appearance)}
-    return study.Flown(crossing, looks, banks)
+    return study.Flown(crossing, looks, appearance, banks)
 
 
 def passing(images=600, closest=0.0, noise=0.0, seed=0):
@@ -72,12 +72,12 @@ def test_two_far_apart_are_two_tracks_without_a_mistake():
     crossing = passing(closest=400, noise=5)
     bank = run_bank(crossing.detections)
     assert len(bank.started) == 2
-    assert not wrong_of(crossing, bank).any()
+    assert not wrong_of(crossing, bank.track, bank.started).any()
     own, nearest = distances_of(crossing, bank)
     assert np.nanmax(own) < 30
     assert np.array_equal(own, nearest, equal_nan=True)
     assert np.isnan(own[:, 0]).all()
-    assert swapped(crossing, bank) == (False, False)
+    assert swapped(crossing, wrong_of(crossing, bank.track, bank.started)) == (False, False)
 
 
 def reversing():
@@ -93,12 +93,12 @@ def reversing():
 def test_who_turns_back_is_swapped_by_distance_and_not_by_looks():
     crossing = reversing()
     alone = run_bank(crossing.detections)
-    assert swapped(crossing, alone) == (True, True)
-    wrong = wrong_of(crossing, alone)
+    assert swapped(crossing, wrong_of(crossing, alone.track, alone.started)) == (True, True)
+    wrong = wrong_of(crossing, alone.track, alone.started)
     assert 0.4 < wrong.mean() < 0.6
     assert not wrong[: len(wrong) // 2 - 20].any()
     told_apart = run_bank(crossing.detections, looking(crossing, 20.0))
-    assert not wrong_of(crossing, told_apart).any()
+    assert not wrong_of(crossing, told_apart.track, told_apart.started).any()
 
 
 @pytest.mark.parametrize(
@@ -119,9 +119,11 @@ def test_a_swap_is_looked_for_just_after_the_crossing_and_at_the_end(from_s, to_
     taken = np.where(crossed, 1 - crossing.boat, crossing.boat)
     empty = np.empty((1200, 2, 4))
     bank = Bank(taken, np.array([0, 1]), np.arange(1200), empty, np.empty((1200, 2, 4, 4)))
-    assert swapped(crossing, bank) == found
+    assert swapped(crossing, wrong_of(crossing, bank.track, bank.started)) == found
     one_side = bank._replace(track=np.where(crossing.boat == 0, taken, crossing.boat))
-    assert swapped(crossing, one_side) == (False, False), "one of the two is no exchange"
+    assert swapped(crossing, wrong_of(crossing, one_side.track, one_side.started)) == (False, False), (
+        "one of the two is no exchange"
+    )
 
 
 def test_detections_are_those_of_the_flight_in_order(flight):
@@ -164,7 +166,7 @@ def test_numbers_are_those_of_the_tracks(flown):
     assert all(load_rules("crossing-vessels").unit_of(name) for _, name in numbers)
     seen = np.bincount(flown.crossing.boat)
     for rule, bank in flown.banks.items():
-        wrong = wrong_of(flown.crossing, bank)
+        wrong = wrong_of(flown.crossing, bank.track, bank.started)
         assert numbers[rule, "wrong"] == wrong.sum()
         assert numbers[rule, "wrong_rate_boat_1"] == wrong[flown.crossing.boat == 0].sum() / seen[0]
         assert numbers[rule, "wrong_rate_boat_2"] == wrong[flown.crossing.boat == 1].sum() / seen[1]

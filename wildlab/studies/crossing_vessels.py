@@ -7,6 +7,8 @@ names size, intensity and the first of Hu's invariants, and prints no spreads: t
 
 A track starts on detections in two consecutive images that lie near each other (H 6.2.4, 6.4.4) and in no
 gate that has room for them (H 3.3). None ends.
+
+Beside it, both vessels as one state, by rules that a tracker of today has (`wildlab.tracking.joint_state`).
 """
 
 from __future__ import annotations
@@ -22,6 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from wildlab.analysis.georeference import observe
 from wildlab.analysis.tracks.pixels import truth_states
+from wildlab.evaluation.intervals import share_interval
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import Flight
 from wildlab.geometry.covariances import gate_threshold
@@ -37,6 +40,7 @@ from wildlab.tracking.association import (
     global_nearest,
     innovation_squared,
 )
+from wildlab.tracking.joint_state import RULES, JointScans, assign_jointly
 from wildlab.tracking.kalman import predict, update
 from wildlab.tracking.motion import constant_velocity, in_steps
 
@@ -260,12 +264,7 @@ def run_bank(detections: ImageDetections, appearance: Appearance | None = None) 
         Tracks and their states.
     """
 
-    @cache
-    def motion(images: int) -> tuple[Array, Array]:
-        """Noise is held over the time between two images, as often as H predicted (6.2)."""
-        held = partial(constant_velocity, sd_acceleration=TUNING.acceleration)
-        return in_steps(images * detections.interval, held, 1.001 * detections.interval)
-
+    motion = cache(partial(_motion, interval=detections.interval))
     R = TUNING.measurement**2 * np.eye(2)
     track = np.full(len(detections.image), -1)
     features = np.empty((len(track), 0)) if appearance is None else appearance.features
@@ -314,6 +313,12 @@ def run_bank(detections: ImageDetections, appearance: Appearance | None = None) 
     for k, then in enumerate(states):
         xs[k, : len(then.x)], Ps[k, : len(then.x)] = then.x, then.P
     return Bank(track, np.array(started, int), images, xs, Ps)
+
+
+def _motion(images: int, interval: float) -> tuple[Array, Array]:
+    """F and Q over so many images: noise is held over the time between two, as often as H predicted (6.2)."""
+    held = partial(constant_velocity, sd_acceleration=TUNING.acceleration)
+    return in_steps(images * interval, held, 1.001 * interval)
 
 
 def _start(z: Array, features: Array, step: tuple[Array, Array]) -> Known:
@@ -449,21 +454,20 @@ def dressed(crossing: Crossing, looks: list[Array], seed: int) -> Appearance:
     return Appearance(features, TOLD_SD)
 
 
-def wrong_of(crossing: Crossing, bank: Bank) -> NDArray[np.bool_]:
-    """(D,) which detections went to a track that the other vessel's detection started."""
-    owner = np.append(crossing.boat[bank.started], -1)[bank.track]  # track -1: of none
+def wrong_of(crossing: Crossing, track: Index, started: Index) -> NDArray[np.bool_]:
+    """(D,) which detections went to a track that the other vessel's detection started; as in `Bank`."""
+    owner = np.append(crossing.boat[started], -1)[track]  # track -1: of none
     return np.asarray((owner >= 0) & (owner != crossing.boat))
 
 
-def swapped(crossing: Crossing, bank: Bank) -> tuple[bool, bool]:
-    """Whether the two have each other's track just after the crossing, and at the end.
+def swapped(crossing: Crossing, wrong: NDArray[np.bool_]) -> tuple[bool, bool]:
+    """By `wrong_of`, whether the two have each other's track just after the crossing, and at the end.
 
     That is, of each more than half of its detections in `WINDOW_S` went to a track of the other; a vessel
     without detections then has no track of the other.
     """
-    at = np.searchsorted(bank.images, crossing.detections.image)
     _, from_s = apart_times(crossing)
-    wrong, when = wrong_of(crossing, bank), crossing.times[at]
+    when = crossing.times[np.unique(crossing.detections.image, return_inverse=True)[1]]
 
     def both(since: float) -> bool:
         inside = (when >= since) & (when <= since + WINDOW_S)
@@ -477,9 +481,9 @@ def numbers_of(crossing: Crossing, banks: dict[str, Bank]) -> Numbers:
     """What `UNITS` names of the tracks by each rule."""
     numbers: Numbers = {}
     for subject, bank in banks.items():
-        wrong = wrong_of(crossing, bank)
+        wrong = wrong_of(crossing, bank.track, bank.started)
         own, any_one = distances_of(crossing, bank)
-        after, end = swapped(crossing, bank)
+        after, end = swapped(crossing, wrong)
         numbers |= {
             (subject, "wrong"): wrong.sum(),
             (subject, "swapped"): after,
@@ -529,11 +533,49 @@ def looks_of(looks: list[Array]) -> Numbers:
     return numbers
 
 
+#: Per axis, m: a detection's own error, and what both of an image share, on six other flights of the twin
+#: (root mean squares of half their difference and of their mean).
+OWN_M, SHARED_M = 2.0, 10.2
+
+
+def join(crossing: Crossing, looks: Appearance, rule: str) -> Numbers:
+    """What both vessels as one state give by a rule of `RULES`: each detection's error its own, part of it
+    shared by those of an image, and with features.
+
+    They are told apart in the first image that shows both. How they look is kept from there.
+    """
+    seen = crossing.detections
+    images, first, count = np.unique(seen.image, return_index=True, return_counts=True)
+    both = int(np.flatnonzero(count == len(BOATS))[0])
+    started = first[both] + np.arange(len(BOATS))
+    rows = np.arange(started[-1] + 1, len(seen.image))
+    motion = cache(partial(_motion, interval=seen.interval))
+    F, Q = (np.array(part) for part in zip(*map(motion, np.diff(images[both:]).tolist()), strict=True))
+    unlike = feature_distances(looks.features[rows], looks.features[started], np.sqrt(2) * looks.sd)
+    x = np.pad(seen.positions[started], ((0, 0), (0, 2)))
+    numbers: Numbers = {}
+    for name, own, shared, weighed in (
+        ("independent", np.hypot(OWN_M, SHARED_M), 0.0, 0.0),
+        ("shared", OWN_M, SHARED_M, 0.0),
+        ("features", OWN_M, SHARED_M, 1.0),
+    ):
+        alone = np.diag(np.square([own, own, TUNING.velocity_0, TUNING.velocity_0]))
+        P = np.kron(np.eye(2), alone) + np.kron(np.ones((2, 2)), np.diag(np.square([shared, shared, 0, 0])))
+        scans = JointScans(seen.positions[rows], count[both + 1 :], F, Q, own, shared, weighed * unlike)
+        track = np.full(len(seen.image), -1)
+        track[started], track[rows] = np.arange(len(BOATS)), assign_jointly(scans, x, P, RULES[rule])
+        wrong = wrong_of(crossing, track, started)
+        numbers[rule, f"wrong_{name}"] = wrong.sum()
+        numbers[rule, f"swapped_{name}"], numbers[rule, f"swapped_at_end_{name}"] = swapped(crossing, wrong)
+    return numbers
+
+
 class Flown(NamedTuple):
-    """A flight, what its camera saw of the two, how they looked, and their tracks by each rule."""
+    """A flight, what its camera saw of the two, how they looked and their detections, and H's tracks."""
 
     crossing: Crossing
     looks: list[Array]
+    appearance: Appearance
     banks: dict[str, Bank]
 
 
@@ -541,15 +583,19 @@ def fly(seed: int, twin: str, images: int, flight: Flight | None = None) -> Flow
     """One simulated flight through every rule; ``flight`` where it is at hand."""
     flight = flight or simulate_twin(twin, seed, ("imu", "gnss"))
     crossing, looks = gather(flight), photograph(twin, seed, flight, images)
-    rules = {DISTANCE: None, FEATURES: dressed(crossing, looks, seed)}
-    return Flown(crossing, looks, {name: run_bank(crossing.detections, how) for name, how in rules.items()})
+    appearance = dressed(crossing, looks, seed)
+    rules = {DISTANCE: None, FEATURES: appearance}
+    banks = {name: run_bank(crossing.detections, how) for name, how in rules.items()}
+    return Flown(crossing, looks, appearance, banks)
 
 
 def all_numbers(flown: Flown) -> Numbers:
     """What the trial gives of a flight that was flown."""
+    joint = (join(flown.crossing, flown.appearance, rule) for rule in RULES)
     return {
         **numbers_of(flown.crossing, flown.banks),
         **looks_of(flown.looks),
+        **{key: value for numbers in joint for key, value in numbers.items()},
         (LOOKS, "closest"): np.nanmin(flown.crossing.apart),
     }
 
@@ -574,6 +620,19 @@ def rules_table(runs: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame:
             | {name: float(runs[rule, name].median()) for name in medians}
             for rule in SUBJECTS
         ]
+    )
+
+
+def joint_table(runs: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame:
+    """One row for each of `RULES`: flights swapped, %, with Wilson's interval, by how errors count."""
+
+    def share(rule: str, name: str) -> str:
+        some = 100 * np.array(share_interval(float(runs[rule, name].sum()), len(runs)))
+        return "{:.0f} ({:.0f} to {:.0f})".format(*some)
+
+    cases = ("swapped_independent", "swapped_shared", "swapped_features")
+    return pd.DataFrame(
+        [{"rule": names[rule]} | {name: share(rule, name) for name in cases} for rule in RULES]
     )
 
 
