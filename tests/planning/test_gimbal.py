@@ -16,6 +16,7 @@ from wildlab.planning.gimbal import (
     camera_on_course,
     look_down,
     swing,
+    swing_rate,
     swing_roll,
     view_inside,
 )
@@ -34,6 +35,14 @@ def test_a_swing_keeps_its_rate_and_its_limits():
     assert np.allclose(swing(t + 8.0, 0.7, 0.35), angle)  # 4 x 0.7 / 0.35
     assert np.allclose(swing(t, 0.7, 0.35, start=0.5), -angle)
     assert (swing(t, 0.0, 1.0) == 0).all()
+
+
+def test_what_one_swing_shows_the_next_shows_again_to_the_overlap():
+    rate = swing_rate(0.6, 20.0, 5.0, overlap=0.3)
+    period = 4 * 0.6 / rate
+    t = np.linspace(0, 3, 50)
+    assert np.allclose(swing(t + period, 0.6, rate), swing(t, 0.6, rate))
+    assert 1 - 5.0 * period / 20.0 == pytest.approx(0.3)
 
 
 def test_where_the_lens_points():

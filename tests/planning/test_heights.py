@@ -32,5 +32,6 @@ def test_it_is_the_lowest_way_within_the_limits(slope):
     asked = rough().heights_at(way.points[:, :2]) + 40
     lowered = slope * np.abs(far[None, :] - far[:, None])
     assert np.allclose(-way.points[:, 2], (asked[None, :] - lowered).max(axis=1))
+    np.testing.assert_allclose(way.above, -way.points[:, 2] - (asked - 40), atol=1e-9)
     assert (way.above >= 40 - 1e-9).all()
     assert np.abs(np.diff(way.points[:, 2]) / np.diff(far)).max() <= slope + 1e-9

@@ -13,7 +13,7 @@ from wildlab.geometry.camera_poses import R_MC_DOWN
 from wildlab.geometry.frames import wrap
 from wildlab.geometry.viewsheds import field_of_view, in_field_of_view
 from wildlab.planning.legs import SearchSensor
-from wildlab.planning.planner import inverse_traces
+from wildlab.planning.planner import detection_probability, inverse_traces
 
 SENSOR = SearchSensor((0.3, 0.2), sd=0.02, reach=100.0, nearest=1e-6)
 coordinate = st.floats(-300, 300)
@@ -31,6 +31,12 @@ def azimuth_elevation(p):
     """F (5.7): from north clockwise, and above the horizon."""
     north, east, down = p - camera_at
     return np.array([np.arctan2(east, north), np.arctan2(-down, np.hypot(north, east))])
+
+
+def test_at_its_reach_one_in_e_is_detected():
+    sensor, at = SearchSensor((0.3, 0.2), sd=0.02, reach=70.0), [0.0, 0.0, -70.0]
+    below = detection_probability([[0.0, 0.0, 0.0], [0.0, 0.0, -35.0]], at, R_MC_DOWN, sensor)
+    assert below == pytest.approx(np.exp([-1.0, -0.25]))
 
 
 @settings(deadline=None, max_examples=100)

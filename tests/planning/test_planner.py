@@ -98,6 +98,15 @@ def test_gains_of_candidates_are_differences_of_the_objective(legs):
     assert gains.max() > 100
 
 
+def test_where_nothing_counts_it_does_not_go():
+    """Two fields alike, to the east and the west beyond the first step; one of them counts for nothing."""
+    east, west = grid((-60, 60), (150, 260)), grid((-60, 60), (-250, -140))
+    for side in (1.0, -1.0):
+        one = planner(np.concatenate([east, west]), turns=(-np.pi / 2, np.pi / 2), steps=1, beyond=1.0)
+        one.weights[one.points[:, 1] * side < 0] = 0.0
+        assert side * one.choose(DOWN).leg.p_nc[-1, 1] > 10
+
+
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_it_looks_aside_where_that_shows_more(side):
     """A strip beside the way: the middle of the image lies on it, and a camera that is fixed tells less."""
