@@ -21,6 +21,7 @@ from wildlab.studies.crossing_vessels import (
     distances_of,
     dressed,
     gather,
+    join,
     photograph,
     run_bank,
     swapped,
@@ -215,6 +216,25 @@ def test_premises_turn_with_the_numbers():
     assert met({}) == crossed | after_swap
     assert met({(LOOKS, "closest"): 18.0}) == after_swap
     assert met({(DISTANCE, "swapped"): 0.0}) == crossed
+
+
+def test_one_state_goes_by_time_and_by_what_both_share():
+    """They pass each other unseen; and side by side, shaken together."""
+    past = passing(images=120, noise=1.0)
+    unseen = (past.detections.image < 50) | (past.detections.image > 70)
+    whole = np.unique(past.detections.image[unseen])
+    parts = past.detections.image[unseen], past.detections.positions[unseen], INTERVAL
+    past = Crossing(ImageDetections(*parts), past.boat[unseen], past.times[whole], past.truth[:, whole])
+    found = join(past, looking(past, 0.0), "gnn")
+    assert not any(found["gnn", f"wrong_{name}"] for name in ("independent", "shared", "features"))
+    beside = passing(images=400, closest=6.0)
+    rng = np.random.default_rng(5)
+    z = np.tile([[0.0, 0.0], [6.0, 0.0]], (400, 1)) + rng.normal(0, 1, (800, 2))
+    z += rng.normal(0, 10, (400, 2)).repeat(2, axis=0)
+    beside = beside._replace(detections=beside.detections._replace(positions=z))
+    found = join(beside, looking(beside, 20.0), "jpda")
+    assert found["jpda", "wrong_features"] == 0 and found["jpda", "wrong_shared"] < 20
+    assert found["jpda", "wrong_independent"] > 100
 
 
 def test_two_are_apart_up_to_just_before_they_meet_and_from_just_after():

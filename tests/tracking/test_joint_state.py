@@ -29,7 +29,7 @@ def scene(seed, T=2, K=4, own=1.0, shared=5.0):
         )
         count.append(len(there))
         whose += there.tolist()
-    P = np.kron(np.eye(T), np.diag([2.0, 2.0, 1.0, 1.0]))
+    P = np.kron(np.diag(np.arange(T) ** 2 + 1.0), np.diag([2.0, 2.0, 1.0, 1.0]))
     unlike = rng.exponential(1.0, (len(whose), T))
     return JointScans(np.concatenate(z), np.array(count), *motion(K), own, shared, unlike), x, P
 
