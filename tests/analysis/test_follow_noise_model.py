@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import multivariate_normal
 
 from tests.analysis.robots import KNOWN, believed, robot_flight, rows_of
 from tests.analysis.survey_twin import Survey, simulate
@@ -19,7 +20,7 @@ from wildlab.analysis.tracks.noise_model import (
 )
 from wildlab.analysis.tracks.scans import predict_scan, scans_of
 from wildlab.analysis.tracks.tracker import track
-from wildlab.analysis.tracks.tuning import tune_flight
+from wildlab.analysis.tracks.tuning import Errors, Noise, log_likelihood, tune_flight
 from wildlab.flight.manifest import parse_settings
 from wildlab.geometry.covariances import pose_covariance
 from wildlab.geometry.frames import euler_to_matrix
@@ -97,6 +98,44 @@ def test_clutter_alone_says_nothing_of_noise(kind):
 
 
 # --- tuning -------------------------------------------------------------------------------------------------
+
+
+def test_errors_are_as_likely_as_one_large_gaussian_has_it():
+    rng = np.random.default_rng(3)
+    times = np.cumsum(rng.uniform(0.1, 2.0, 12))
+    H = rng.normal(size=(12, 2, 3))
+    noise = Noise(np.array([0.4, 0.7]), np.array([1.0, 0.0, 0.5]), 3.0)
+    fade = np.exp(-np.abs(times[:, None] - times) / 3.0)
+    full = np.einsum("aik,k,bjk->aibj", H, noise.lasting**2, H) * fade[:, None, :, None]
+    full = full.reshape(24, 24) + np.diag(np.tile(noise.white**2, 12))
+    e = rng.multivariate_normal(np.zeros(24), full)
+    dense = multivariate_normal.logpdf(e, np.zeros(24), full) + 12 * np.log(2 * np.pi)
+    assert log_likelihood([Errors(times, e.reshape(12, 2), H)], noise) == pytest.approx(dense)
+
+
+def test_a_heading_that_is_off_teaches_no_clock_and_a_few_gross_errors_teach_nothing():
+    (tuned,) = tune_flight(robot_flight(9, heading_off_deg=2.0), ["radar"]).sensors.values()
+    assert abs(tuned.offset_s) < 0.3 and tuned.clock_sd_s < 0.3
+    assert 1.0 < np.degrees(tuned.heading_sd_rad) < 3.0
+    sound, gross = (robot_flight(9, seconds=400.0) for _ in range(2))
+    gross.tables["detections"].loc[[100, 300, 500, 700], "azimuth_rad"] += 2.0
+    before, after = (tune_flight(one, ["radar"]).sensors["radar"] for one in (sound, gross))
+    assert np.degrees(after.heading_sd_rad) < 0.1
+    np.testing.assert_allclose(after.own_sds, before.own_sds, rtol=0.02)
+
+
+def test_what_is_stated_takes_the_place_of_what_was_tuned_of_it_alone():
+    tuned = tune_flight(robot_flight(8, heading_off_deg=2.0), ["radar"]).sensors["radar"]
+    tuned = tuned._replace(heading_sd_rad=0.03, range_bias_sd_m=0.4)
+    flight = robot_flight(9)
+    stated = parse_settings("[sensors.radar.considered.heading]\nsd_deg = 1.0\n")
+    scans = scans_of(flight, "radar")
+    model, given = model_noise(flight, scans, settings_of(flight, stated), tuned, "first")
+    sds = {one.name: one.sd for one in model.considered}
+    assert sds["heading"] == np.radians(1.0) and sds["range_bias"] == 0.4
+    sources = {one.what: one.source for one in given}
+    assert sources["considered error: heading"] == "stated"
+    assert sources["considered error: range bias"] == "tuned on first"
 
 
 @pytest.mark.slow

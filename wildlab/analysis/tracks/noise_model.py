@@ -91,9 +91,11 @@ class SensorTuning(NamedTuple):
     n
         Errors it is from.
     own_sds
-        Of each element, where they are of several units; ``sd`` is then in metres across the line of sight.
+        Of each element, where they are of several units.
     range_bias_sd_m, tilt_sd_rad
         As ``heading_sd_rad``, for sensors that measure ranges, and for cameras (about each level axis).
+    white_sds
+        Of each element, what is new at every scan; left out: what does not last of ``sds``.
     """
 
     sensor: str
@@ -114,6 +116,7 @@ class SensorTuning(NamedTuple):
     own_sds: tuple[float, ...] = ()
     range_bias_sd_m: float = 0.0
     tilt_sd_rad: float = 0.0
+    white_sds: tuple[float, ...] = ()
 
     @property
     def clock_tuned(self) -> bool:
@@ -327,7 +330,7 @@ def noise_of_tuning(tuning: SensorTuning) -> NoiseModel:
         tuning.kind,
         tuning.offset_s,
         tuning.sds,
-        tuning.sds * np.sqrt(1 - tuning.next_correlation),
+        np.array(tuning.white_sds or tuning.sds * np.sqrt(1 - tuning.next_correlation)),
         tuple(lasting),
         tuning.next_correlation,
         tuning.fading,
@@ -369,14 +372,15 @@ def model_noise(
     amounts = [_amount(name, float(sd)) for name, sd in zip(scans.elements, noise, strict=True)]
     for one in dict.fromkeys(zip(map(_noise_words, scans.elements), amounts, sources, strict=True)):
         given.add(*one)
-    considered, source = _considered(flight, scans, settings, found, by_tuning)
     errors = {}
-    for error in considered:
+    chosen = _considered(flight, scans, settings, found, by_tuning)
+    considered = tuple(error for error, _ in chosen)
+    for error, source in chosen:
         name = "tilt" if error.name in TOGETHER["tilt"] else error.name.replace("_", " ")
         lasts = "constant" if np.isinf(error.correlation_time_s) else f"for {error.correlation_time_s:.3g} s"
-        errors[name] = f"{_in_unit(error)}, {lasts}"
+        errors[name] = f"{_in_unit(error)}, {lasts}", source
     for name, value in errors.items():
-        given.add(f"considered error: {name}", value, source)
+        given.add(f"considered error: {name}", *value)
     offset, source = part.clock_offset_s, STATED
     if tuned is not None and tuned.clock_tuned and "clock_offset_s" not in part.model_fields_set:
         offset, source = tuned.offset_s, by_tuning
@@ -446,28 +450,27 @@ def _noise(
 
 def _considered(
     flight: Flight, scans: Scans, settings: Settings, found: NoiseModel | None, by_tuning: str
-) -> tuple[tuple[ConsideredError, ...], str]:
+) -> list[tuple[ConsideredError, str]]:
+    """Each with who says so: what is stated, and what was tuned beside it; else the platform's."""
     part = settings.sensors.get(scans.sensor, SensorPart())
-    if part.considered:
-        stated = []
-        for name, one in part.considered.items():
-            if not _considers(scans, name):
-                known = ", ".join(slot for slot in CONSIDERED if _considers(scans, slot))
-                raise WildlabError(
-                    f"the error {name!r} cannot be considered for detections of kind {scans.kind!r}",
-                    f"use one of {known}",
-                    field=f"sensors.{scans.sensor}.considered",
-                )
-            sd = np.radians(one.sd) if CONSIDERED[name] == "deg" else one.sd
-            time = np.inf if one.correlation_time_s is None else one.correlation_time_s
-            stated += [
-                ConsideredError(each, float(sd), float(time), one.shared) for each in errors_named(name)
-            ]
-        return tuple(stated), STATED
-    if found is not None and found.considered:
-        return found.considered, by_tuning
+    stated, named = list[ConsideredError](), set[str]()
+    for name, one in part.considered.items():
+        if not _considers(scans, name):
+            known = ", ".join(slot for slot in CONSIDERED if _considers(scans, slot))
+            raise WildlabError(
+                f"the error {name!r} cannot be considered for detections of kind {scans.kind!r}",
+                f"use one of {known}",
+                field=f"sensors.{scans.sensor}.considered",
+            )
+        sd = np.radians(one.sd) if CONSIDERED[name] == "deg" else one.sd
+        time = np.inf if one.correlation_time_s is None else one.correlation_time_s
+        stated += [ConsideredError(each, float(sd), float(time), one.shared) for each in errors_named(name)]
+        named |= set(errors_named(name))
+    tuned = [] if found is None else [one for one in found.considered if one.name not in named]
+    if stated or tuned:
+        return [(one, STATED) for one in stated] + [(one, by_tuning) for one in tuned]
     if scans.poses is not None and scans.poses.covariance is not None:
-        return (), ""
+        return []
     stated_sds = {
         name: (getattr(flight.manifest.uncertainty, key), key.endswith("deg"))
         for name, key in OF_PLATFORM.items()
@@ -478,7 +481,7 @@ def _considered(
         for name, (sd, degrees) in stated_sds.items()
         if sd is not None
     ]
-    return tuple(errors), "[uncertainty] of flight.toml"
+    return [(one, "[uncertainty] of flight.toml") for one in errors]
 
 
 def errors_named(name: str) -> tuple[str, ...]:

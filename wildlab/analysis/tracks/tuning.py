@@ -1,22 +1,27 @@
 """What one flight teaches about sensors and targets, for another one to be judged by.
 
-Against truth: how late a sensor's clock is, how large its errors are and how long they last; where no
-detection says what it is of, the one nearest to a target, within reach, is taken for its own. Without truth:
-noise and liveliness under which a flight's own innovations are likeliest.
+Against truth: how late a sensor's clock is, how large its errors are, how long they last and what of. Noise
+and errors that last are found together, by how likely they make the errors of each target (`Noise`); an error
+beyond `GROSS` standard deviations of what is expected of it counts as one there and teaches nothing else.
+Where no detection says what it is of, the one nearest to a target, within reach, is taken for its own.
+
+Without truth: noise and liveliness under which a flight's own innovations are likeliest.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from scipy.optimize import curve_fit, minimize, nnls
+from numpy.typing import NDArray
+from scipy.optimize import minimize
 
 from wildlab.analysis.tracks.noise_model import (
     GROUPS,
+    MEDIAN_OF_NORMAL,
     NOISE_OF,
     Against,
     SensorInputs,
@@ -29,8 +34,6 @@ from wildlab.analysis.tracks.noise_model import (
 from wildlab.analysis.tracks.scans import (
     SLOTS,
     Scans,
-    Truth,
-    across,
     errors_near,
     predict_scan,
     scans_of,
@@ -41,28 +44,59 @@ from wildlab.analysis.tracks.tracker import read_inputs, worth
 from wildlab.errors import WildlabError
 from wildlab.flight.manifest import Settings
 from wildlab.flight.store import Flight
+from wildlab.geometry.compilation import compiled
 from wildlab.geometry.frames import Array
 from wildlab.tracking.run import Start, run_filter
 from wildlab.tracking.sensors import Merged, head
 
-#: Offsets tried, s: the largest known delays are three.
-OFFSETS_S = np.arange(-5.0, 2.001, 0.05)
-#: Longest lag at which errors are compared, s; a flight of two minutes has only few pairs further apart.
-LONGEST_LAG_S = 30.0
+#: Offsets tried, s: the largest known delays are three; at first each so many, then those about the best.
+OFFSETS_S, COARSE = np.arange(-5.0, 2.001, 0.05), 5
+#: Beyond so many standard deviations an error is gross.
+GROSS = 5.0
+#: Errors that parameters are fitted to, at most, of each target.
+MOST_ERRORS = 2000
+#: Errors may last so long at most, s.
+LONGEST_S = 1e4
 #: Fewest errors from which anything is estimated.
 FEWEST = 20
 #: Half of chi-square's 95 % point with one degree of freedom: how far a log-likelihood may lie below its top.
 DROP = 1.92
 
 
-class _Errors(NamedTuple):
-    """Detections of one target: errors (N, m), NaN where there is none, and the same in one unit."""
+class Noise(NamedTuple):
+    """What errors are made of.
+
+    Attributes
+    ----------
+    white
+        (m,) standard deviation of each element that is new at every scan.
+    lasting
+        (k,) of each error of `SLOTS` that fades from scan to scan.
+    time_s
+        How long these last.
+    """
+
+    white: Array
+    lasting: Array
+    time_s: float
+
+
+class Errors(NamedTuple):
+    """Of one target: times (N,), errors (N, m), and what a unit of each error that lasts does to them
+    (N, m, k). NaN where nothing is known, infinite where the target is missed."""
 
     times: Array
     error: Array
-    sized: Array
-    truth: Truth
-    scans: Scans
+    H: Array
+
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """(N,) where there is an error."""
+        return np.asarray(np.isfinite(self.error).all(axis=1) & np.isfinite(self.H).all(axis=(1, 2)))
+
+    def head(self, rows: NDArray[np.bool_] | slice) -> Errors:
+        """Some of them."""
+        return Errors(*(part[rows] for part in self))
 
 
 def tune(
@@ -103,17 +137,22 @@ def tune(
 
 def _tuned(flight: Flight, sensor: str, reach: float, source: str | None, offsets: Array) -> SensorTuning:
     """The tuning with the best of some offsets; of one alone its interval is NaN."""
+    kept: dict[float, tuple[Scans, list[Errors]]] = {}
 
-    def errors_at(offset: float) -> list[_Errors]:
-        return _errors_of(flight, scans_of(flight, sensor, offset, source), reach)
+    def errors_at(offset: float) -> list[Errors]:
+        if offset not in kept:
+            scans = scans_of(flight, sensor, offset, source)
+            kept[offset] = scans, _errors_of(flight, scans, reach)
+        return kept[offset][1]
 
-    costs = np.array([_cost(errors_at(float(o)), reach) for o in offsets])
-    best = int(np.argmin(costs))
-    offset = float(offsets[best])
+    now = float(offsets[np.argmin(np.abs(offsets))])
+    scans = kept[now][0] if errors_at(now) else scans_of(flight, sensor, now, source)
+    groups, m = _groups(scans), scans.detections.shape[-1]
+    offset, low, high = now, float("nan"), float("nan")
+    if len(offsets) > 1:
+        offset, low, high = _clock(errors_at, offsets, now)
     errors = errors_at(offset)
-    scans = errors[0].scans if errors else scans_of(flight, sensor, offset, source)
-    known = np.concatenate([one.error[np.isfinite(one.error[:, 0])] for one in errors])
-    n = len(known)
+    n = sum(int(one.known.sum()) for one in errors)
     if n < FEWEST:
         raise WildlabError(
             f"only {n} detections of {sensor!r} lie near a target with truth",
@@ -121,137 +160,241 @@ def _tuned(flight: Flight, sensor: str, reach: float, source: str | None, offset
             file=flight.folder,
             field="detections",
         )
-    sized = np.concatenate([one.sized[np.isfinite(one.error[:, 0])] for one in errors])
-    sd = float(np.sqrt(np.mean(sized**2)))
-    alike = len({NOISE_OF[name] for name in scans.elements}) == 1
-    own = () if alike else tuple(np.sqrt(np.mean(known**2, axis=0)).tolist())
-    sds = np.array(own) if own else np.full(known.shape[1], float(np.sqrt(np.mean(known**2))))
-    # Correlated errors are worth fewer: the sum of squares says less than it seems to.
-    counted = [one.error for one in errors if np.isfinite(one.error[:, 0]).any()]
-    independent = sum(max([1.0, *map(worth, error.T)]) for error in counted)
-    low, high = float("nan"), float("nan")
-    near = offsets[(costs - costs[best]) / (2 * sd**2) * independent / n <= DROP]
-    if len(offsets) > 1:
-        low, high = float(near.min()), float(near.max())
-    share, correlation_time = _autocorrelation(errors, sds if own else np.ones(1), scans.interval_s)
-    lasting = _considered(errors, sds, share * np.exp(-scans.interval_s / correlation_time))
-    position, clock, heading, range_bias, tilt = lasting
+    noise = fit_noise(errors, groups, scans.elements)
+    known = [one.head(one.known) for one in errors]
+    H = np.concatenate([one.H for one in known])
+    lasting = variance_of(H, noise).mean(axis=0)
+    total = noise.white**2 + lasting
+    near = [truth.position for truth in truths_at(flight, kept[offset][0].times)]
     distance = np.concatenate(
-        [np.hypot(*(one.truth.position - scans.platform).T)[np.isfinite(one.error[:, 0])] for one in errors]
+        [
+            np.hypot(*(position - kept[offset][0].platform).T)[one.known]
+            for position, one in zip(near, errors, strict=True)
+        ]
     )
+    alike = len({NOISE_OF[name] for name in scans.elements}) == 1
+    by_group = [noise.lasting[group[0]] if group else 0.0 for group in _groups(scans, every=True)]
+    position, clock, heading, range_bias, tilt = (float(sd) for sd in by_group)
     return SensorTuning(
-        sensor,
-        scans.kind,
-        offset,
-        low,
-        high,
-        float(sds[0]) if not own else sd,
-        share,
-        correlation_time,
-        position,
-        clock,
-        heading,
-        float(distance.mean()),
-        float(distance.std()),
-        scans.interval_s,
-        n,
-        own,
-        range_bias,
-        tilt,
+        sensor, scans.kind, offset, low, high, float(np.sqrt(total.mean())),
+        float((lasting / total).mean()), noise.time_s, position, clock, heading, float(distance.mean()),
+        float(distance.std()), scans.interval_s, n, () if alike and m > 1 else tuple(np.sqrt(total).tolist()),
+        range_bias, tilt, tuple(noise.white.tolist()),
+    )  # fmt: skip
+
+
+def _groups(scans: Scans, every: bool = False) -> list[list[int]]:
+    """Places among the errors of the scans' kind of each of `GROUPS`; those that it has, or every one."""
+    slots = SLOTS[scans.kind]
+    found = [[slots.index(name) for name in group if name in slots] for group in GROUPS]
+    return [group for group in found if group or every]
+
+
+def _clock(
+    errors_at: Callable[[float], list[Errors]], offsets: Array, now: float
+) -> tuple[float, float, float]:
+    """The offset with least squares, and its 95 % interval.
+
+    It is taken where the interval leaves out the clock as it is, and where to either half of the targets and
+    of the time the best offset of the other half is likelier; else the clock stays, and the interval holds
+    that, too.
+    """
+    best, where = now, offsets[::COARSE]
+    for _ in range(2):
+        errors = errors_at(best)
+        scale = _scale([one.error for one in errors])
+        each = _independent(errors)
+        found = {o: each * _halves(errors_at(o), scale) for o in sorted({*where.tolist(), now})}
+        best = min(found, key=lambda one: found[one][0].sum())
+        at = int(np.argmin(np.abs(offsets - best)))
+        where = offsets[max(at - 4 * COARSE, 0) : at + 4 * COARSE + 1]
+    tried, costs = np.array(list(found)), np.array(list(found.values()))  # (offsets, splits, halves)
+    whole = costs[:, 0].sum(axis=1)
+    near = tried[whole <= whole.min() + DROP]
+    of_other = np.take_along_axis(costs, costs.argmin(axis=0)[None, :, ::-1], axis=0)[0]
+    if whole[tried == now] > whole.min() + DROP and (found[now] > of_other).all():
+        return best, float(near.min()), float(near.max())
+    return now, min(float(near.min()), now), max(float(near.max()), now)
+
+
+def _scale(errors: Sequence[Array]) -> Array:
+    """(m,) spread of errors (N, m) about zero, by their medians."""
+    size = np.abs(np.concatenate(errors))
+    size = size[np.isfinite(size).all(axis=1)]
+    return (
+        np.maximum(np.median(size, axis=0) / MEDIAN_OF_NORMAL, 1e-9) if len(size) else np.ones(size.shape[1])
     )
 
 
-def _errors_of(flight: Flight, scans: Scans, reach: float) -> list[_Errors]:
+def _independent(errors: list[Errors]) -> float:
+    """How many independent errors one is worth: of each target's alone, and of all one after the other, for
+    what lasts may be of the platform; the fewer of both."""
+    alone = [one.error[one.known] for one in errors]
+    if not sum(map(len, alone)):
+        return 1.0
+    order = np.argsort(np.concatenate([one.times[one.known] for one in errors]), kind="stable")
+    together = np.concatenate(alone)[order]
+    of_alone = sum(max([1.0, *map(worth, one.T)]) for one in alone if len(one))
+    return float(min(of_alone, max([1.0, *map(worth, together.T)])) / len(together))
+
+
+def _halves(errors: list[Errors], scale: Array) -> Array:
+    """(splits, 2) half the squares of errors in units of their scale, of either half of the targets (where
+    there are several) and of the time.
+
+    Gross errors count as ones at `GROSS`. A scan that an offset takes out of the truth's time counts as the
+    mean of the others: none gains by it.
+    """
+    times = np.concatenate([one.times[one.known] for one in errors])
+    middle, place = np.median(times) if len(times) else 0.0, np.arange(len(errors)) % 2
+    splits = [[place == half for half in (0, 1)]] if len(errors) > 1 else []
+    found = []
+    for split in (*splits, None):
+        for half in (0, 1):
+            total, known, scans = 0.0, 0, 0
+            for number, one in enumerate(errors):
+                rows = (
+                    (one.times < middle) == (half == 0)
+                    if split is None
+                    else np.full(len(one.times), split[half][number])
+                )
+                there = rows & ~np.isnan(one.error).any(axis=1)
+                squares = np.minimum((one.error[there] / scale) ** 2, GROSS**2).sum()
+                total, known, scans = total + squares / 2, known + there.sum(), scans + rows.sum()
+            found.append(total * scans / known if known else 0.0)
+    return np.array(found).reshape(-1, 2)
+
+
+def _errors_of(flight: Flight, scans: Scans, reach: float) -> list[Errors]:
+    """Of each target. One without a name that is missed where it should be seen counts as far off, or an
+    offset would gain by losing it."""
     found = []
     for truth in truths_at(flight, scans.times):
         error = errors_near(scans, truth, reach)[0]
-        expected = predict_scan(scans, truth.position, truth.velocity).z
-        found.append(_Errors(scans.times, error, across(scans, error[:, None], expected)[:, 0], truth, scans))
+        if not scans.labelled:
+            missed = np.isnan(error) & np.isfinite(truth.position[:, :1])
+            error = np.where(missed, np.inf, error)
+        found.append(Errors(scans.times, error, predict_scan(scans, truth.position, truth.velocity).H_pose))
     return found
 
 
-def _cost(errors: list[_Errors], reach: float) -> float:
-    """Sum of squared errors, as if every scan had a truth beside it.
-
-    A scan at a target that has no detection within reach costs as much as one at its edge, and one that an
-    offset takes out of the truth's time as much as the mean of the others: no offset gains by losing scans.
-    Detections that say what they are of are not lost by being far off.
-    """
-    squares = []
-    for one in errors:
-        missing = np.nan if one.scans.labelled else reach**2
-        size = np.where(np.isfinite(one.error[:, 0]), np.sum(one.sized**2, axis=1), missing)
-        squares.append(size[np.isfinite(one.truth.position[:, 0]) & np.isfinite(size)])
-    known = np.concatenate(squares) if squares else np.empty(0)
-    return float(known.mean() * sum(len(one.times) for one in errors)) if len(known) else float("inf")
-
-
-def _autocorrelation(errors: list[_Errors], sds: Array, interval: float) -> tuple[float, float]:
-    """Share and time of ``share * exp(-lag / time)``, by weighted least squares over the lags.
-
-    Means are left in: a standing error is the most correlated there is.
-    """
-    step = max(interval, 0.5)
-    lags = np.arange(1, int(LONGEST_LAG_S / step) + 1)
-    products, squares, pairs = np.zeros(len(lags)), np.zeros(len(lags)), np.zeros(len(lags))
-    for one in errors:
-        known = np.isfinite(one.error[:, 0])
-        t, e = one.times[known], one.error[known] / sds
-        lag = np.rint((t[None, :] - t[:, None]) / step).astype(int)
-        dot, size = e @ e.T, np.sum(e**2, axis=1)
-        mean = (size[None, :] + size[:, None]) / 2
-        for i, k in enumerate(lags):
-            both = lag == k
-            products[i] += dot[both].sum()
-            squares[i] += mean[both].sum()
-            pairs[i] += both.sum()
-    used = pairs > 0
-    r = products[used] / squares[used]
-    # Short lags are known better: the error of a correlation goes with 1 - r^2.
-    doubt = np.maximum(1 - r**2, 0.05) / np.sqrt(pairs[used])
-
-    def model(lag: Array, share: float, time: float) -> Array:
-        return share * np.exp(-lag / time)
-
-    found, _ = curve_fit(
-        model,
-        lags[used] * step,
-        r,
-        p0=(0.8, 10.0),
-        sigma=doubt,
-        bounds=((0.0, step / 3), (1.0, 20 * LONGEST_LAG_S)),
-    )
-    return float(found[0]), float(found[1])
-
-
-def _considered(errors: Sequence[_Errors], sds: Array, share: float) -> list[float]:
-    """Standard deviations (m, s, rad) that the correlated variance is put down to, for each of `GROUPS`.
-
-    Non-negative least squares of the errors' products, less the part that is white, on what a unit of each
-    would bring about at every scan; all elements in units of their own standard deviation.
-    """
-    slots = SLOTS[errors[0].scans.kind]
-    groups = [[slots.index(name) for name in group if name in slots] for group in GROUPS]
-    used = [group for group in groups if group]
-    columns: list[Array] = []
-    wanted: list[Array] = []
-    for one in errors:
-        known = np.isfinite(one.error[:, 0])
-        H = predict_scan(one.scans, one.truth.position, one.truth.velocity).H_pose[known] / sds[:, None]
-        known_H = np.isfinite(H).all(axis=(1, 2))
-        H, e = H[known_H], one.error[known][known_H] / sds
-        columns.append(
-            np.stack([(H[..., g] @ np.swapaxes(H[..., g], 1, 2)).reshape(len(H), -1) for g in used], axis=-1)
+def log_likelihood(errors: Sequence[Errors], noise: Noise) -> float:
+    """Of errors of targets, each alone; of gross ones as if they were `GROSS` standard deviations off."""
+    used = noise.lasting > 0
+    return float(
+        sum(
+            _of_errors(t, error, H[..., used], noise.white, noise.lasting[used], noise.time_s)
+            for t, error, H in errors
         )
-        white = (1 - share) * np.eye(e.shape[1])
-        wanted.append((e[:, :, None] * e[:, None, :] - white).reshape(len(e), -1))
-    A = np.concatenate([one.reshape(-1, len(used)) for one in columns])
-    b = np.concatenate([one.ravel() for one in wanted])
-    # In units in which each brings about the same, or radians would weigh nothing.
-    scale = np.sqrt(np.mean(A**2, axis=0))
-    scale[scale == 0] = 1.0
-    variances = iter(nnls(A / scale, b)[0] / scale)
-    return [float(np.sqrt(next(variances))) if group else 0.0 for group in groups]
+    )
+
+
+@compiled
+def _of_errors(times: Array, error: Array, H: Array, white: Array, lasting: Array, time_s: float) -> float:
+    """By a Kalman filter on the errors that last, element after element."""
+    k = len(lasting)
+    b, P, across, total, last = np.zeros(k), np.diag(lasting**2), np.zeros(k), 0.0, -np.inf
+    for row in range(len(times)):
+        if not (error[row] == error[row]).all() or not (H[row] == H[row]).all():
+            continue
+        fade = np.exp(-(times[row] - last) / time_s)
+        last = times[row]
+        for i in range(k):
+            b[i] *= fade
+            for j in range(k):
+                P[i, j] *= fade**2
+            P[i, i] += (1 - fade**2) * lasting[i] ** 2
+        for element in range(len(white)):
+            S, off = white[element] ** 2, error[row, element]
+            for i in range(k):
+                across[i] = 0.0
+                for j in range(k):
+                    across[i] += P[i, j] * H[row, element, j]
+                S += H[row, element, i] * across[i]
+                off -= H[row, element, i] * b[i]
+            total -= np.log(S) / 2
+            if off**2 >= GROSS**2 * S:
+                total -= GROSS**2 / 2
+                continue
+            total -= off**2 / S / 2
+            for i in range(k):
+                b[i] += across[i] * off / S
+                for j in range(k):
+                    P[i, j] -= across[i] * across[j] / S
+    return total
+
+
+def fit_noise(errors: Sequence[Errors], groups: Sequence[list[int]], elements: Sequence[str]) -> Noise:
+    """The likeliest noise, one standard deviation for each of the groups of errors that last and for elements
+    of a kind. Groups are taken in one by one, the one that explains most first, while errors become likelier
+    than chance makes them.
+
+    Parameters
+    ----------
+    errors
+        Of each target.
+    groups
+        Of errors that last, by their place in ``H``.
+    elements
+        Names of the m elements of a measurement.
+    """
+    some = [one.head(one.known).head(slice(MOST_ERRORS)) for one in errors]
+    some = [one for one in some if len(one.times)]
+    kinds = list(dict.fromkeys(NOISE_OF[name] for name in elements))
+    kind = np.array([kinds.index(NOISE_OF[name]) for name in elements])
+    if not some:
+        return Noise(np.ones(len(elements)), np.zeros(errors[0].H.shape[-1]), LONGEST_S)
+    H = np.concatenate([one.H for one in some])
+    size = np.abs(np.concatenate([one.error for one in some]))
+    scale = np.array([np.median(size[:, kind == number]) for number in range(len(kinds))]) / MEDIAN_OF_NORMAL
+    scale = np.maximum(scale, 1e-9)
+
+    def fitted(white: Array, used: list[list[int]], lasting: Array, time_s: float) -> tuple[float, Noise]:
+        first = np.log([*white, *lasting, time_s])
+
+        def noise_of(logs: Array) -> Noise:
+            values = np.exp(np.clip(logs, first - 7, first + 7))
+            every = np.zeros(H.shape[-1])
+            for group, sd in zip(used, values[len(kinds) : -1], strict=True):
+                every[group] = sd
+            return Noise(values[: len(kinds)][kind], every, float(min(values[-1], LONGEST_S)))
+
+        def cost(logs: Array) -> float:
+            return -log_likelihood(some, noise_of(logs))
+
+        best = minimize(cost, first, method="L-BFGS-B", options={"maxiter": 40, "eps": 1e-4})
+        return -float(best.fun), noise_of(np.asarray(best.x))
+
+    worth, found = fitted(scale, [], np.zeros(0), 20.0)
+    used: list[list[int]] = []
+    while rest := [group for group in groups if group not in used]:
+        tries = []
+        for group in rest:
+            unit = np.sqrt(np.mean(((np.abs(H[..., group]).sum(axis=-1)) / scale[kind]) ** 2))
+            if unit > 0:
+                sds = [*(found.lasting[one[0]] for one in used), 0.5 / unit]
+                white = np.array([found.white[kind == number][0] for number in range(len(kinds))])
+                tries.append((*fitted(white, [*used, group], np.array(sds), found.time_s), group))
+        best = max(tries, key=lambda one: one[0], default=None)
+        if best is None or best[0] - worth < DROP:
+            break
+        worth, found = best[:2]
+        used.append(best[2])
+    # How fast errors change tells little of the size of those that outlast the flight: they are no larger
+    # than what was seen.
+    lasting = variance_of(H, found)
+    total = lasting + found.white**2
+    gross = size**2 > GROSS**2 * total
+    seen = np.nanmean(np.where(gross, np.nan, size**2), axis=0)
+    room = np.maximum(seen - found.white**2, 0) / seen
+    needed = np.mean(lasting, axis=0) / seen
+    share = min(1.0, float(room.sum() / needed.sum())) if needed.any() else 1.0
+    return found._replace(lasting=np.sqrt(share) * found.lasting)
+
+
+def variance_of(H: Array, noise: Noise) -> Array:
+    """(N, m) what errors that last add to those with derivatives (N, m, k)."""
+    return np.asarray(np.einsum("nik,k->ni", H**2, noise.lasting**2))
 
 
 #: Looks of a sensor that are gone over: enough to tell, and few enough to go over often.
@@ -369,9 +512,10 @@ def read_tuned(text: str) -> Tuned | None:
     """What `tuned_text` wrote; None of an empty text."""
     if not text:
         return None
-    data: Mapping[str, Any] = json.loads(text)
+    data: Any = json.loads(text)
+    lists = ("own_sds", "white_sds")
     sensors = {
-        name: SensorTuning(**{**one, "own_sds": tuple(one["own_sds"])})
+        name: SensorTuning(**one | {key: tuple(one[key]) for key in lists})
         for name, one in data["sensors"].items()
     }
     return Tuned(data["flight"], data["against"], sensors, data["density"])
