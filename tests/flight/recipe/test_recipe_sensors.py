@@ -10,8 +10,10 @@ from tests.flight.recipe.comparing import near
 from tests.sound_logs import NED
 from wildlab.errors import WildlabError
 from wildlab.flight.checks.check import usable_for
+from wildlab.flight.clocks import gnss_times
 from wildlab.flight.store import Flight
 
+VELOCITY = ("v_north_m_s", "v_east_m_s", "v_down_m_s")
 IMU = """
 name = "box"
 angle_random_walk_deg_sqrt_h = 0.1
@@ -73,6 +75,10 @@ def test_axes_and_units(sensors):
     near(imu, np.radians([[4.0, 3.0, 4.0]] * 200), "w_x_rad_s", "w_y_rad_s", "w_z_rad_s")
     assert (flight.manifest.imu.name, flight.manifest.imu.angle_random_walk_deg_sqrt_h) == ("box", 0.1)
     assert {source.file for source in flight.manifest.sources} >= {"imu.csv", "gps.csv"}
+    ten = 10 * 1852 / 3600
+    near(flight.table("gnss"), [[0, ten, 1], [-ten, 0, -2], [-ten, 0, -2]], *VELOCITY)
+    # What the receiver calls so late happened so much before.
+    np.testing.assert_allclose(gnss_times(flight), [0.05, 0.25, 3.95], atol=1e-9)
     # All is there for navigation but the speed that its heading is told by: 10 knots are 5.1 m/s.
     assert not usable_for(flight)[2].usable and "5.1 m/s" in usable_for(flight)[2].why
 
