@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,11 +15,13 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.analysis import Fact, fact
-from wildlab.analysis.georeference import blocks_of, camera_poses_at, truth_of
+from wildlab.analysis.diagnose import diagnose
+from wildlab.analysis.georeference import camera_poses_at, georeference, observe, score_points
 from wildlab.detection.boards import Board, find_board, grey8
 from wildlab.detection.flow import as_grey, image_motion
 from wildlab.errors import WildlabError
 from wildlab.flight.calibration_files import BoardPart, CameraFile, EvidencePart, ParameterPart, ViewPart
+from wildlab.flight.checks.known_points import ENOUGH, NEAR_CLOCKS, sighting_cost, sightings
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.manifest import CameraPart
 from wildlab.flight.readers.frames import Frame
@@ -27,14 +29,8 @@ from wildlab.flight.readers.frames.image import file_name, read_image
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_clock import FEWEST as FEWEST_PAIRS
-from wildlab.geometry.camera_clock import (
-    ClockByMotion,
-    ClockByPoints,
-    clock_by_motion,
-    clock_by_points,
-    translation_over_ground,
-)
-from wildlab.geometry.camera_poses import CameraPoses, camera_rotation
+from wildlab.geometry.camera_clock import clock_by_motion, translation_over_ground
+from wildlab.geometry.camera_poses import camera_rotation
 from wildlab.geometry.frames import Array, Indices, Mask, matrix_to_rotation_vector
 from wildlab.geometry.intrinsics import (
     FEWEST,
@@ -494,8 +490,18 @@ def refuse_without_clock(flight: Flight, source: str | None = None) -> None:
         )
 
 
+#: Beyond this (s) the clock is looked for before other constants; one apart by more is another, and one apart
+#: by less than the second the same.
+APART_S, SAME_S = 1.5, 0.1
+#: Logarithm of how much more likely the best offset has to be than one that is apart, for each block.
+CERTAIN = 5.0
+
+
 def clock_from_points(flight: Flight, source: str | None = None) -> CameraClock:
     """What to add to the stamps of the images so that known points appear where they were seen.
+
+    The estimate is that of `diagnose`, beside whatever else is constantly wrong; its standard deviation holds
+    the distance to the clocks of models that explain the errors as well.
 
     Parameters
     ----------
@@ -507,48 +513,58 @@ def clock_from_points(flight: Flight, source: str | None = None) -> CameraClock:
     Raises
     ------
     WildlabError
-        Where the images have no clock, or fewer than four sightings have a pose.
+        Where the images have no clock, or too few sightings of known points have a pose.
     """
     refuse_without_clock(flight, source)
-    frames, pixels, truth = flight.table("frames"), flight.detections, flight.truth
-    if pixels is None or truth is None or "target_id" not in pixels:
-        pixels = pd.DataFrame()
-    else:
-        known = pixels["target_id"].isin(truth["target_id"]) & pixels["frame_id"].isin(frames["frame_id"])
-        pixels = pixels[(pixels["kind"] == "pixel") & known].reset_index(drop=True)
-    if len(pixels) < 4:
+    name, _ = flight.pose_source(source)
+    seen = sightings(flight, name)
+    if seen is None or not seen.named:
         raise WildlabError(
-            f"{len(pixels)} detections are of a target whose position is known, at least 4 are needed",
-            "name the targets of detections and add their truth, or give the images with --images",
+            f"fewer than {ENOUGH} detections with a pose are of a target whose position is known",
+            "name the targets of detections and add their truth, or give the images with --images; "
+            "wildlab check says whether images and poses are of the same time",
             file=flight.folder,
             field="detections",
         )
-    at = flight.frame_rows(pixels["frame_id"])
-    times = frame_times(flight)[at]
-    table = pd.DataFrame({"target_id": pixels["target_id"].to_numpy(object), "frame_id": pixels["frame_id"]})
 
-    def seen_at(offset: float) -> tuple[CameraPoses, Array]:
-        poses = camera_poses_at(flight, times + offset, source)
-        if "pan_rad" in frames:
-            pan, tilt = frames[["pan_rad", "tilt_rad"]].to_numpy(float)[at].T
-            poses = replace(poses, pan=pan, tilt=tilt)
-        return poses, truth_of(flight, table.assign(time_s=times + offset))
+    def costs(offsets: Array) -> Array:
+        return np.array([sighting_cost(seen.shifted(float(by))) for by in offsets])
 
-    found = clock_by_points(
-        seen_at,
-        pixels[["u_px", "v_px"]].to_numpy(float),
-        pixels["frame_id"].to_numpy(object),
-        blocks_of(flight, table.assign(time_s=times)),
-    )
-    if found is None:
+    far = costs(NEAR_CLOCKS)
+    top = float(NEAR_CLOCKS[np.argmin(far)])
+    near = top + np.arange(-1.0, 1.01, 0.05)
+    offsets, cost = np.append(NEAR_CLOCKS, near), np.append(far, costs(near))
+    best = float(offsets[np.argmin(cost)])
+    begun = best if abs(best) > APART_S else 0.0
+    observations = observe(flight, name, clock_shift=begun)
+    scored = score_points(flight, georeference(observations, np.random.default_rng(0)))
+    found = diagnose(observations, scored)
+    model = found.most_likely_with("clock")
+    if model is None:
         raise WildlabError(
-            "fewer than four sightings of known points have a pose, with any offset of the camera's clock",
-            "check that images and poses are of the same time: wildlab check says what overlaps",
+            "known points appear where they do whatever the clock of the camera",
+            "use images of a stretch in which the camera moves, or state the offset",
             file=flight.folder,
-            field="detections",
+            field="frames",
         )
-    rests = {"points": found.points, "images": found.images, "blocks": found.draws}
-    return _told(flight, "points", found, rests, {"cost": found.cost})
+    k, offset = model.fit.names.index("clock"), begun + model.value("clock")
+    apart = np.where(np.abs(offsets - best) > APART_S, cost, np.inf)
+    blocks, rival = len(np.unique(found.blocks)), float(offsets[np.argmin(apart)])
+    alone = blocks * (apart.min() - cost.min()) > CERTAIN
+    if alone:
+        others = (begun + one.value("clock") for one in (found.winner, *found.rivals))
+        rival = max(others, key=lambda other: abs(other - offset))
+        alone = abs(rival - offset) <= SAME_S
+    numbers: dict[str, float] = {
+        "offset_s": offset,
+        "sd_s": float(np.hypot(np.sqrt(model.covariance[k, k]), alone * (rival - offset))),
+        "rival_s": rival,
+    }
+    rests = {"points": len(scored), "images": int(scored["frame_id"].nunique()), "blocks": blocks}
+    order = np.argsort(offsets, kind="stable")
+    curve = pd.DataFrame({"offset_s": offsets[order], "cost": cost[order]})
+    doubt = "misfit" if not found.fits else "" if alone else "open"
+    return _told(flight, "points", numbers, doubt, rests, curve)
 
 
 def image_motions(frames: Iterable[Frame], flight: Flight, camera: Camera) -> tuple[Indices, Array]:
@@ -624,8 +640,10 @@ def clock_from_motions(
             field="frames",
         )
     rests = {"pairs": found.pairs, "correlation": found.peak, "rival_correlation": found.rival_correlation}
-    curve = {"correlation": found.correlation}
-    return _told(flight, "motion", found, rests | {"gain": found.gain}, curve)
+    curve = pd.DataFrame({"offset_s": found.offsets, "correlation": found.correlation})
+    estimate = {name: getattr(found, name) for name in ("offset_s", "sd_s", "rival_s")}
+    doubt = "" if found.certain else "open"
+    return _told(flight, "motion", estimate, doubt, rests | {"gain": found.gain}, curve)
 
 
 def clock_from_images(flight: Flight, frames: Iterable[Frame], source: str | None = None) -> CameraClock:
@@ -692,21 +710,22 @@ class CameraClock(NamedTuple):
 def _told(
     flight: Flight,
     way: str,
-    found: ClockByPoints | ClockByMotion,
+    estimate: dict[str, float],
+    doubt: str,
     rests: Mapping[str, float],
-    curve: dict[str, Array],
+    curve: pd.DataFrame,
 ) -> CameraClock:
     stated = flight.manifest.clocks.camera_offset_s
-    offset_s, rival_s = found.offset_s + stated, found.rival_s + stated
+    offset_s, rival_s = (estimate[name] + stated for name in ("offset_s", "rival_s"))
     numbers: dict[str, object] = {
         "offset_s": offset_s,
-        "sd_s": found.sd_s,
-        "certain": found.certain,
+        "sd_s": estimate["sd_s"],
+        "certain": not doubt,
         "method": {"points": "known points", "motion": "image motion"}[way],
         "rival_s": rival_s,
         **rests,
     }
     shown = {name: f"{one:.2f}" if isinstance(one, float) else str(one) for name, one in rests.items()}
-    shown |= {"offset_s": f"{offset_s:+.3f}", "rival_s": f"{rival_s:+.3f}", "sd_s": f"{found.sd_s:.3f}"}
-    said = fact(f"clock-{way}-{'certain' if found.certain else 'open'}", **shown)
-    return CameraClock(numbers, pd.DataFrame({"offset_s": found.offsets + stated} | curve), (said,))
+    shown |= {"offset_s": f"{offset_s:+.3f}", "rival_s": f"{rival_s:+.3f}", "sd_s": f"{estimate['sd_s']:.3f}"}
+    said = fact(f"clock-{way}-{doubt or 'certain'}", **shown)
+    return CameraClock(numbers, curve.assign(offset_s=curve["offset_s"] + stated), (said,))

@@ -135,6 +135,10 @@ class Model:
         alone = f" ({', '.join(self.fit.names)} alone)" if lacking else ""
         return (" and ".join(self.causes) or "nothing") + alone
 
+    def value(self, name: str) -> float:
+        """The estimate of a parameter; zero where the model has it not."""
+        return float(dict(zip(self.fit.names, self.fit.values, strict=True)).get(name, 0.0))
+
 
 @dataclass(frozen=True)
 class Diagnosis:
@@ -197,6 +201,11 @@ class Diagnosis:
         """Other models that explain the errors as well: the data do not separate them from the winner."""
         return tuple(self.models[m] for m in self.ranked.rivals)
 
+    def most_likely_with(self, name: str) -> Model | None:
+        """The winner, or where it lacks a parameter the most likely model that has it, if any."""
+        order = [self.ranked.winner, *np.argsort(self.ranked.scores, kind="stable")]
+        return next((self.models[m] for m in order if name in self.models[m].fit.names), None)
+
     @property
     def inseparable(self) -> tuple[str, ...]:
         """Causes of the winner and its rivals, where it has any: which of them it is, the data do not say."""
@@ -205,14 +214,28 @@ class Diagnosis:
         return tuple(dict.fromkeys(cause for one in (self.winner, *self.rivals) for cause in one.causes))
 
     @property
+    def certain(self) -> tuple[str, ...]:
+        """Causes that are certain: no rival lacks them, and a parameter of theirs differs from zero.
+
+        None where taking the winner off gained nothing, its estimate may be chance, or no model fits.
+        """
+        one, found = self.winner, set(nonzero(self.calibration))
+        if not (one.gain.counts and one.chance < CHANCE and self.fits):
+            return ()
+        shared = (cause for cause in one.causes if all(cause in rival.causes for rival in self.rivals))
+        return tuple(cause for cause in shared if found & set(CAUSES[cause]))
+
+    @property
     def counts(self) -> bool:
-        """Whether the winner is certain: taking it off gained something, its estimate is not chance, nothing
-        else explains the errors as well or better, they do not depend on how targets lie, no more points are
-        far out than :data:`MANY_OUT`, and the noise explains what is left."""
-        one = self.winner
-        certain = bool(one.causes) and one.gain.counts and one.chance < CHANCE and not self.rivals
-        certain &= not self.extended and not self.misfit
-        return certain and not self.implausible and bool(nonzero(self.calibration)) and not self.too_many_out
+        """Whether the winner is certain: its cause is, and nothing else explains the errors as well."""
+        return bool(self.certain) and not self.rivals
+
+    @property
+    def fits(self) -> bool:
+        """Whether what is tried can explain the errors: they do not depend on how targets lie, the noise
+        explains what is left, nothing implausible explains them better, and no more points are far out than
+        :data:`MANY_OUT`."""
+        return not (self.extended or self.misfit or self.implausible or self.too_many_out)
 
     @property
     def too_many_out(self) -> bool:

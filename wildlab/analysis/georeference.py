@@ -18,7 +18,7 @@ from wildlab.analysis import Fact, fact
 from wildlab.errors import WildlabError
 from wildlab.evaluation.intervals import time_blocks
 from wildlab.files import write_atomic, write_csv
-from wildlab.flight.clocks import between, frame_times, gimbal_angles, pose_finder, poses_at, truth_at
+from wildlab.flight.clocks import frame_times, gimbal_angles, gimbal_at, pose_finder, poses_at, truth_at
 from wildlab.flight.schema import POSITION
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera_poses import CameraPoses
@@ -174,7 +174,7 @@ def camera_poses(flight: Flight, source: str, times: Array, rows: Indices) -> Ca
     """
     name, nav = flight.pose_source(source)
     p_nb, R_nb, covariance = poses_at(nav, times, flight.table("frames")["frame_id"].iloc[rows])
-    pan, tilt = (angle[rows] for angle in gimbal_angles(flight))
+    pan, tilt = gimbal_angles(flight, times, rows)
     p_nb[rows < 0], R_nb[rows < 0] = np.nan, np.nan
     m = flight.manifest
     return CameraPoses(m.geometry_camera(), m.geometry_mount(name), p_nb, R_nb, pan, tilt, covariance)
@@ -184,10 +184,7 @@ def camera_poses_at(flight: Flight, times: Array, source: str | None = None) -> 
     """The camera's poses at times (N,) s, by the log: NaN where it has none."""
     name, nav = flight.pose_source(source)
     p_nb, R_nb, covariance = poses_at(nav, times)
-    pan, tilt = None, None
-    if flight.gimbal is not None:
-        angles = np.unwrap(flight.gimbal[["pan_rad", "tilt_rad"]].to_numpy(float), axis=0)
-        pan, tilt = between(flight.gimbal["time_s"].to_numpy(float), angles, times, "gimbal").T
+    pan, tilt = (None, None) if flight.gimbal is None else gimbal_at(flight.gimbal, times)
     manifest = flight.manifest
     return CameraPoses(
         manifest.geometry_camera(), manifest.geometry_mount(name), p_nb, R_nb, pan, tilt, covariance
@@ -205,15 +202,17 @@ def _grounded(observations: Observations) -> Observations:
 def shifting_poses(observations: Observations) -> PosesAt:
     """From seconds to the poses of observations whose camera stamps are so much later; the last few are kept.
 
-    A moving gimbal keeps the angles it had at the unshifted stamps, and the poses their covariance.
+    They keep their covariance, and angles of a gimbal that the images state.
     """
-    times = observations.table["time_s"].to_numpy(float)
-    find = pose_finder(observations.flight.nav[observations.source], observations.table["frame_id"])
+    flight, times = observations.flight, observations.table["time_s"].to_numpy(float)
+    find = pose_finder(flight.nav[observations.source], observations.table["frame_id"])
+    rows = flight.frame_rows(observations.table["frame_id"])
 
     @lru_cache(maxsize=4)
     def at(shift: float) -> CameraPoses:
         p_nb, R_nb = find(times + shift)
-        return replace(observations.poses, p_nb=p_nb, R_nb=R_nb)
+        pan, tilt = gimbal_angles(flight, times + shift, rows)
+        return replace(observations.poses, p_nb=p_nb, R_nb=R_nb, pan=pan, tilt=tilt)
 
     return at
 

@@ -259,8 +259,10 @@ def covariance_columns(covariance: ArrayLike) -> pd.DataFrame:
     return pd.DataFrame(P[:, _UPPER[0], _UPPER[1]], columns=list(COVARIANCE_COLUMNS))
 
 
-def gimbal_angles(flight: Flight) -> tuple[Array, Array]:
-    """Pan and tilt of the gimbal for every frame, radians, (N,) each.
+def gimbal_angles(
+    flight: Flight, times: ArrayLike | None = None, rows: Indices | None = None
+) -> tuple[Array, Array]:
+    """Pan and tilt of the gimbal for every frame, or for others and as it was at other times, radians.
 
     From the columns of the frames where they have them, else from the gimbal table (linear in time), else the
     fixed angles of the manifest. They take the place of the manifest's, they are not added to them.
@@ -269,6 +271,8 @@ def gimbal_angles(flight: Flight) -> tuple[Array, Array]:
     ----------
     flight
         With frames.
+    times, rows
+        (N,) flight times, s, of frames in these rows of their table.
 
     Returns
     -------
@@ -279,15 +283,20 @@ def gimbal_angles(flight: Flight) -> tuple[Array, Array]:
     WildlabError
         Where the flight has no frames, or the stamps of the gimbal do not increase.
     """
-    frames = flight.table("frames")
-    mount = flight.manifest.geometry_mount()
+    frames, mount = flight.table("frames"), flight.manifest.geometry_mount()
     if "pan_rad" in frames:
-        return frames["pan_rad"].to_numpy(float), frames["tilt_rad"].to_numpy(float)
+        pan, tilt = frames[["pan_rad", "tilt_rad"]].to_numpy(float)[slice(None) if rows is None else rows].T
+        return pan, tilt
+    at = frame_times(flight) if times is None else np.asarray(times, float)
     if flight.gimbal is None:
-        return np.full(len(frames), mount.pan), np.full(len(frames), mount.tilt)
-    angles = np.unwrap(flight.gimbal[["pan_rad", "tilt_rad"]].to_numpy(float), axis=0)
-    stamps = flight.gimbal["time_s"].to_numpy(float)
-    pan, tilt = between(stamps, angles, frame_times(flight), "gimbal").T
+        return np.full(len(at), mount.pan), np.full(len(at), mount.tilt)
+    return gimbal_at(flight.gimbal, at)
+
+
+def gimbal_at(gimbal: pd.DataFrame, times: ArrayLike) -> tuple[Array, Array]:
+    """Pan and tilt at flight times (N,) by the gimbal's table, radians, (N,) each; NaN where it has none."""
+    angles = np.unwrap(gimbal[["pan_rad", "tilt_rad"]].to_numpy(float), axis=0)
+    pan, tilt = between(gimbal["time_s"].to_numpy(float), angles, times, "gimbal").T
     return pan, tilt
 
 

@@ -83,6 +83,16 @@ def test_a_mistake_that_explains_others_is_named_alone(kind, mistake, cause):
     assert cause in found.causes
 
 
+@pytest.mark.parametrize(("seed", "late_s", "tilt_deg"), [(1, 0.4, 2.0), (1, 1.0, 2.0), (3, 1.0, -3.0)])
+def test_a_clock_is_found_beside_a_tilt(seed, late_s, tilt_deg):
+    """To a tenth of a second: a search for the clock alone would take the tilt's part, too."""
+    flight = shift("frames", -late_s)(simulate_sound_flight("fixed wing", seed))
+    (found,) = accusations(euler(NAV, lambda e: e + np.array([0.0, tilt_deg, 0.0]))(flight))
+    assert found.causes == ("clock of the camera",)
+    offset = found.corrections[0](flight).manifest.clocks.camera_offset_s
+    assert offset == pytest.approx(late_s, abs=0.05)
+
+
 def circling(
     pitch_deg: float,
     heading_deg: float,

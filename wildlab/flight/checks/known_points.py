@@ -43,12 +43,13 @@ from wildlab.flight.checks.findings import (
     thin,
     undo_in,
 )
-from wildlab.flight.clocks import between, frame_times, gimbal_angles, poses_at, truth_at
+from wildlab.flight.clocks import frame_times, gimbal_angles, poses_at, truth_at
 from wildlab.flight.schema import POSITION
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera, normalise
 from wildlab.geometry.camera_poses import R_MC_DOWN, R_MC_FORWARD, Looks, Mount, camera_pose, camera_rotation
 from wildlab.geometry.frames import Array, Indices, Mask, Origin, euler_to_matrix, matrix_to_euler
+from wildlab.geometry.robust import student_cost
 from wildlab.names import listed
 
 #: So many points say all there is to say, and fewer than so many say nothing.
@@ -165,15 +166,10 @@ def sightings(flight: Flight, source: str) -> Sightings | None:
     labels = detections["target_id"].to_numpy(object) if named else None
     try:
         times = frame_times(flight)[frame]
-        still = tuple(angle[frame] for angle in gimbal_angles(flight))
-        moving = None if "pan_rad" in frames else flight.gimbal
 
         def looked(shift: float) -> SightingGeometry:
             p, R, _ = poses_at(brief, times + shift, ids)
-            pan, tilt = still
-            if moving is not None:
-                turns = np.unwrap(moving[["pan_rad", "tilt_rad"]].to_numpy(float), axis=0)
-                pan, tilt = between(moving["time_s"].to_numpy(float), turns, times + shift, "gimbal").T
+            pan, tilt = gimbal_angles(flight, times + shift, frame)
             return SightingGeometry(p, R, _points(flight, times + shift, labels), pan, tilt)
 
         at = looked(0.0)
@@ -621,10 +617,15 @@ def best_of(cost: Callable[[float], float], grid: Array) -> float:
     return float(minimize_scalar(cost, bounds=about, options={"maxiter": 14}).x)
 
 
-def _cost(s: Sightings) -> float:
-    """How badly sightings fit: with small errors allowed for a constant is hardly seen, and without it takes
-    their part, so both count."""
-    return float(np.sqrt(np.prod(glance(s))))
+def sighting_cost(s: Sightings) -> float:
+    """How badly sightings fit beside small constant errors, which are fitted along and held near zero."""
+    m = missed(s)
+    good = m.good
+    if good.mean() < 0.5 or good.sum() < ENOUGH:
+        return np.inf
+    value, J = constant_of(m, good, ALLOWED)
+    size = np.linalg.norm(m.turn - J @ value, axis=1) / m.expected
+    return (student_cost(size[good] ** 2) + float(((value / ALLOWED) ** 2).sum()) / 2) / good.sum()
 
 
 def _raised(s: Sightings, by: float) -> Sightings:
@@ -633,7 +634,7 @@ def _raised(s: Sightings, by: float) -> Sightings:
 
 def height_mistakes(s: Sightings) -> Iterator[Mistake[Sightings]]:
     """A constant by which the poses are too high or too low."""
-    by = best_of(lambda h: _cost(_raised(s, h)), HEIGHTS)
+    by = best_of(lambda h: sighting_cost(_raised(s, h)), HEIGHTS)
     if abs(by) >= 3.0:
         yield mistake(
             one_row("constant-height"),
@@ -672,7 +673,7 @@ def clock_mistakes(s: Sightings, offset_s: float) -> Iterator[Mistake[Sightings]
         facts |= {"by": by, "offset": offset_s + by}
         return mistake(row, lambda x: x.shifted(by), *corrections, fitted=fitted, **facts)
 
-    by = best_of(lambda t: _cost(s.shifted(t)), CLOCKS)
+    by = best_of(lambda t: sighting_cost(s.shifted(t)), CLOCKS)
     if abs(by) > 0.05:
         yield clock(one_row("camera-clock"), by, fitted=True)
     for seconds in LEAP_S:
@@ -691,8 +692,8 @@ MEETS, MEETS_DEG = 3.0, 6.0
 MORE, LEAST = 2.0, 0.3
 #: Mistakes are named together whose shares are so near each other.
 ALIKE_SHARE = 0.9
-#: Clocks that are looked for, s.
-NAMELESS_CLOCKS = np.arange(-30.0, 30.5, 0.5)
+#: Clocks that are looked for where turns of a flight are short, s.
+NEAR_CLOCKS = np.arange(-30.0, 30.5, 0.5)
 
 
 def shares(s: Sightings) -> Array:
@@ -736,7 +737,7 @@ def _nameless_mistakes(flight: Flight, s: Sightings) -> Iterator[Mistake[Sightin
     yield from mount_mistakes(s)
     yield from attitudes_in(s.source, "", "R_nb")
     yield from pixel_mistakes(s)
-    by = best_of(lambda t: -float(shares(s.shifted(t)).min()), NAMELESS_CLOCKS)
+    by = best_of(lambda t: -float(shares(s.shifted(t)).min()), NEAR_CLOCKS)
     if flight.manifest.time.kind == "utc" and abs(by) >= 1.0:
         offset = flight.manifest.clocks.camera_offset_s + by
         yield mistake(one_row("camera-clock"), lambda x: x.shifted(by), fitted=True, by=by, offset=offset)
