@@ -16,11 +16,11 @@ from wildlab.analysis.accuracy import corrected_flight
 from wildlab.analysis.georeference import truth_of
 from wildlab.analysis.tracks.tracker import read_inputs
 from wildlab.errors import WildlabError
-from wildlab.evaluation.intervals import Interval
 from wildlab.flight.calibration_files import parse_learnt, read_learnt, write_calibration
 from wildlab.flight.checks.check import find
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import load_flight, save_flight
+from wildlab.messages.catalogue import Message, load_texts
 from wildlab.paths import DATA
 from wildlab.runner.evaluate import evaluate_flight
 
@@ -54,24 +54,21 @@ def test_what_is_learnt_is_written_and_of_one_camera_alone(folder, tmp_path):
     assert not (tmp_path / "reports").exists()
 
 
-def learn(monkeypatch, **found):
-    """Have the command find this, and write nothing."""
-    learnt = SimpleNamespace(gain=None, parameter=())
-    both = learnt, SimpleNamespace(**found)
-    monkeypatch.setattr("wildlab.analysis.accuracy.learn_flight", lambda *_: both)
+def learn(monkeypatch, gain=None):
+    """Have the command find no cause that is certain, or one with this gain, and write nothing."""
+    found = SimpleNamespace(gain=gain, parameter=()), SimpleNamespace(winner=SimpleNamespace(name="clock"))
+    monkeypatch.setattr("wildlab.analysis.accuracy.learn_flight", lambda *_: found)
     monkeypatch.setattr("wildlab.flight.calibration_files.write_calibration", lambda *_: None)
+    monkeypatch.setattr("wildlab.reporting.georeferencing.cause_message", lambda _: Message("cause-none"))
 
 
-def test_causes_that_are_inseparable_are_named(folder, tmp_path, monkeypatch):
-    """A small tilt of a camera in level flight: position and clock explain it, too."""
-    gain = SimpleNamespace(with_=2.0, counts=True, gain=Interval(1.0, 0.4, 1.6))
-    winner = SimpleNamespace(causes=("clock",), name="clock", gain=gain)
-    rival = SimpleNamespace(causes=("boresight",), gain=SimpleNamespace(with_=2.1, counts=True))
-    for rivals in ((rival,), ()):
-        ranked = SimpleNamespace(rivals=tuple(range(1, 1 + len(rivals))))
-        learn(monkeypatch, winner=winner, ranked=ranked, models=[winner, *rivals])
-        out = succeed("calibrate", folder / "short", "--out", tmp_path / "c.toml")
-        assert ("boresight" in out) == bool(rivals)
+@pytest.mark.parametrize("certain", [False, True])
+def test_a_file_that_corrects_nothing_says_so(folder, tmp_path, monkeypatch, certain):
+    gain = SimpleNamespace(without_m=3.0, with_m=1.0, low_m=1.0, high_m=3.0)
+    learn(monkeypatch, gain if certain else None)
+    out = succeed("calibrate", folder / "short", "--out", tmp_path / "c.toml")
+    texts = (load_texts("terminal"), "calibrate-nothing"), (load_texts("georeferencing"), "cause-none")
+    assert [text.answers[key] in out for text, key in texts] == [not certain] * 2
 
 
 @pytest.mark.slow
@@ -168,9 +165,7 @@ def test_poses_that_a_check_doubts_teach_only_when_asked_to(tmp_path, monkeypatc
     alone = replace(flight, tables={name: flight.tables[name] for name in ("frames", "detections", "truth")})
     wrong = euler("nav/autopilot", lambda e: e[:, [1, 0, 2]])(alone)
     save_flight(wrong, tmp_path / "wrong")
-    gain = SimpleNamespace(gain=Interval(np.nan, np.nan, np.nan))
-    winner = SimpleNamespace(causes=(), gain=gain)
-    learn(monkeypatch, winner=winner, models=[winner], ranked=SimpleNamespace(rivals=()))
+    learn(monkeypatch)
     call = ("calibrate", tmp_path / "wrong", "--out", tmp_path / "c.toml")
     assert "--despite-warnings" in refuse(*call)
     succeed(*call, "--despite-warnings")
@@ -183,7 +178,5 @@ def test_a_clock_that_a_check_finds_off_is_what_is_to_be_learnt(tmp_path, monkey
     late = replace(flight, tables={**flight.tables, "frames": frames.assign(time_s=frames["time_s"] + 2.0)})
     assert {("clock of the camera",)} <= {one.causes for one in find(late, plain=False)}
     save_flight(late, tmp_path / "late")
-    gain = SimpleNamespace(gain=Interval(np.nan, np.nan, np.nan))
-    winner = SimpleNamespace(causes=(), gain=gain)
-    learn(monkeypatch, winner=winner, models=[winner], ranked=SimpleNamespace(rivals=()))
+    learn(monkeypatch)
     succeed("calibrate", tmp_path / "late", "--out", tmp_path / "c.toml")

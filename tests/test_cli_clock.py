@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,11 +15,13 @@ from tests.analysis.survey_twin import Survey, simulate
 from tests.annotation import write_images
 from tests.commands import succeed
 from wildlab.analysis import camera as module
-from wildlab.analysis.accuracy import as_calibrated, learn_flight
+from wildlab.analysis.accuracy import apply_learnt, as_calibrated, corrected_flight, learn_flight
 from wildlab.analysis.camera import CameraClock
+from wildlab.analysis.georeference import observe
 from wildlab.cli import wildlab
 from wildlab.errors import WildlabError
 from wildlab.flight.calibration_files import LearntParameter
+from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import load_flight, save_flight
 
 
@@ -63,14 +66,38 @@ def test_known_points_tell_it_where_motion_does_not(motion, points, said, tmp_pa
 
 
 @pytest.mark.slow
-def test_what_a_kept_calibration_adds_is_not_set_again(tmp_path):
+def test_a_clock_that_is_set_takes_the_place_of_a_calibration_s(tmp_path):
     late = LearntParameter(name="clock", value=0.3, low=0.2, high=0.4, unit="s")
     flight = simulate(Survey(images=12, clock_s=0.5))
     kept = learn_flight(flight, np.random.default_rng(0))[0]
     kept = kept.model_copy(update={"parameter": (late,), "covariance": ((0.0025,),)})
     folder = save_flight(flight, tmp_path / "flight", calibration=kept).folder
+    assert as_calibrated(load_flight(folder)).manifest.clocks.camera_offset_s == pytest.approx(0.3)
     for found in ([], ["--offset", "0.5"]):
         succeed("clock", folder, "--set", *found)
         set_ = load_flight(folder)
-        assert set_.manifest.clocks.camera_offset_s == pytest.approx(0.2, abs=0.15)
-        assert as_calibrated(set_).manifest.clocks.camera_offset_s == pytest.approx(0.5, abs=0.15)
+        assert set_.manifest.clocks.camera_offset_s == pytest.approx(0.5, abs=0.05)
+        assert as_calibrated(set_).manifest.clocks == set_.manifest.clocks
+
+
+@pytest.mark.parametrize(
+    ("stated", "learnt_with", "adds"),
+    [(0.0, 0.0, True), (-7200.0, 0.0, True), (0.2, 0.2, True), (0.4, 0.0, False), (3600.4, 0.0, False)],
+)
+def test_a_calibration_s_clock_is_no_second_one(stated, learnt_with, adds):
+    flight = simulate(Survey(images=12, clock_s=0.5))
+    learnt = learn_flight(flight, np.random.default_rng(0))[0]
+    (clock,) = learnt.parameter
+    assert clock.name == "clock"
+    there = learnt.learnt_on.model_copy(update={"camera_offset_s": learnt_with})
+    learnt = learnt.model_copy(update={"learnt_on": there})
+    judged = replace(
+        flight, manifest=replace_in_manifest(flight.manifest, {"clocks": {"camera_offset_s": stated}})
+    )
+    offset = corrected_flight(judged, None, learnt).manifest.clocks.camera_offset_s
+    assert offset == pytest.approx(stated + adds * clock.value)
+    applied = apply_learnt(observe(judged), learnt)
+    assert applied.observations.table["time_s"].iloc[0] == pytest.approx(
+        observe(judged).table["time_s"].iloc[0] + adds * clock.value
+    )
+    assert ("applied-own-clock" in dict(applied.facts)) != adds

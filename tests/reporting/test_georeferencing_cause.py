@@ -110,6 +110,28 @@ def test_a_cause_that_another_explains_as_well_does_not_count():
     assert shown["what"].tolist()[tables.SHOWN :] == ["**boresight**", "clock", "nothing"]
 
 
+def test_what_every_rival_holds_is_certain_and_the_rest_is_open():
+    winner = model(["boresight", "clock"], with_=2.0)
+    holding = [model(["height", "clock"], with_=2.1), model(["clock", "lens"], with_=2.2)]
+    found = diagnosis(winner, *holding, rivals=holding)
+    assert not found.counts and found.certain == ("clock",)
+    said = page.cause_message(found)
+    assert said.key == "cause-common"
+    assert [said.values[name] for name in ("common", "causes", "others")] == [
+        page.words_of_causes(["clock"]),
+        page.words_of_causes(["boresight"]),
+        " or ".join(page.words_of_causes([one]) for one in ("height", "lens")),
+    ]
+    # One rival without it, or a gain that is not certain, leave it open, too.
+    without = model(["height", "heading"], with_=2.1)
+    for open_ in (
+        diagnosis(winner, *holding, without, rivals=[*holding, without]),
+        diagnosis(model(["boresight", "clock"], with_=8.0, half=4.0), *holding, rivals=holding),
+        replace(found, misfit=True),
+    ):
+        assert open_.certain == () and page.cause_message(open_).key == "cause-inseparable"
+
+
 def test_what_is_not_told_from_zero_is_not_blamed():
     found = diagnosis(model(["height", "boresight", "clock"], with_=1.3))
     names = ("down", "tilt", "clock")
@@ -258,7 +280,8 @@ def test_the_most_pressing_reason_is_given(given, key):
 def test_every_sentence_has_its_words_and_every_word_its_sentence():
     """Keys that the rules give in the tests above are those of the catalogue, with all their values."""
     said = [page.cause_message(d) for d in (None, diagnosis(MOST, out=6), *map(diagnosis, ALL_WINNERS))]
-    said += [page.cause_message(diagnosis(MOST, RIVAL, rivals=(RIVAL,)))]
+    both = model(["boresight", "clock"], with_=2.0), model(["height", "clock"], with_=2.1)
+    said += [page.cause_message(diagnosis(*of, rivals=of[1:])) for of in ((MOST, RIVAL), both)]
     said += [one for given in ANSWERS for one in page.answer(found_with(**given))]
     for given, options, _ in ADVICE:
         said += page.advice(found_with(**given), **{"calibrated_elsewhere": False, **options})

@@ -18,13 +18,13 @@ from tests.sharing.canary import EPOCH, HASH, START, canary, place, velocity
 from wildlab.analysis.georeference import observe
 from wildlab.analysis.navigate import REFERENCES, reference_of
 from wildlab.errors import WildlabError
+from wildlab.flight.calibration_files import ZONE_S
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import PREFERRED, Flight, save_flight
 from wildlab.geometry.camera import normalise
 from wildlab.geometry.frames import local_earth
 from wildlab.navigation.strapdown import ImuSamples, integrate_strapdown
 from wildlab.sharing.generalisation import (
-    QUARTER,
     Generalised,
     first_stamp,
     generalise,
@@ -202,7 +202,7 @@ def test_stamps_begin_at_zero_and_keep_their_distances():
 @given(st.integers(-60, 60), st.floats(-449, 449))
 @settings(max_examples=40, deadline=None)
 def test_no_zone_of_time_is_left_in_an_offset(quarters, rest):
-    flight = canary(imu=False, clocks={"truth_offset_s": quarters * QUARTER + rest})
+    flight = canary(imu=False, clocks={"truth_offset_s": quarters * ZONE_S + rest})
     assert made(flight).flight.manifest.clocks.truth_offset_s == pytest.approx(rest, abs=1e-6)
 
 

@@ -8,9 +8,10 @@ from hypothesis import settings as rounds
 from hypothesis import strategies as st
 
 from wildlab.errors import WildlabError
+from wildlab.flight.calibration_files import ZONE_S
 from wildlab.flight.files import dump_toml
 from wildlab.flight.manifest import parse_settings
-from wildlab.sharing.generalisation import QUARTER, Names, neutral_settings, whole_quarters
+from wildlab.sharing.generalisation import Names, neutral_settings, whole_quarters
 
 TOLD = """
 [sensors."Letaba mast"]
@@ -76,4 +77,4 @@ def test_an_offset_that_tells_a_zone_is_refused_with_what_to_do():
 @given(st.integers(-60, 60), st.floats(-449, 449))
 @rounds(max_examples=50, deadline=None)
 def test_of_an_offset_whole_quarters_are_cut(quarters, rest):
-    assert whole_quarters(quarters * QUARTER + rest) == pytest.approx(quarters * QUARTER, abs=1e-6)
+    assert whole_quarters(quarters * ZONE_S + rest) == pytest.approx(quarters * ZONE_S, abs=1e-6)

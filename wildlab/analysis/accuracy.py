@@ -51,6 +51,7 @@ from wildlab.flight.calibration_files import (
     LearntParameter,
     read_learnt,
     refuse_other_camera,
+    without_own_clock,
 )
 from wildlab.flight.clocks import truth_at
 from wildlab.flight.manifest import replace_in_manifest
@@ -395,6 +396,7 @@ def learn_from(observations: Observations, diagnosis: Diagnosis) -> Learnt:
             images=calibration.n_images,
             points=calibration.n_points,
             blocks=calibration.n_draws,
+            camera_offset_s=flight.manifest.clocks.camera_offset_s,
         ),
         conditions=Conditions(height_m=_range(height), depression_deg=_range(depression)),
         camera=camera,
@@ -460,9 +462,12 @@ def apply_learnt(observations: Observations, learnt: Learnt) -> Applied:
         Where it was learnt with another camera or another mount.
     """
     refuse_other_camera(observations.flight.manifest, learnt)
-    placed = calibrated(observations, _calibration(learnt))
-    deviations = {name: float(value) for name, value in learnt.noise.model_dump().items()}
-    return Applied(placed, deviations, _facts(observations, learnt))
+    used = without_own_clock(observations.flight.manifest, learnt)
+    facts = _facts(observations, used)
+    if used is not learnt:
+        facts.append(fact("applied-own-clock"))
+    deviations = {name: float(value) for name, value in used.noise.model_dump().items()}
+    return Applied(calibrated(observations, _calibration(used)), deviations, facts)
 
 
 def corrected_flight(flight: Flight, source: str | None, learnt: Learnt) -> Flight:
@@ -482,7 +487,8 @@ def corrected_flight(flight: Flight, source: str | None, learnt: Learnt) -> Flig
     Flight
         With other clock, mount, camera, noise, positions and heading of that source.
     """
-    calibration, m = _calibration(learnt), flight.manifest
+    m = flight.manifest
+    calibration = _calibration(without_own_clock(m, learnt))
     name, nav = flight.pose_source(source)
     if m.camera is None or not calibration.names:
         return flight

@@ -210,18 +210,10 @@ def clock(
         )
     from dataclasses import replace
 
-    from wildlab.flight.calibration_files import read_learnt
     from wildlab.flight.manifest import replace_in_manifest
     from wildlab.flight.store import save_flight
 
-    kept = () if loaded.calibration is None else read_learnt(loaded.calibration).parameter
-    # What the calibration adds is added whenever the flight is read with it.
-    by_calibration = sum(one.value for one in kept if one.name == "clock")
-    stated = round(float(str(said["offset_s"])) - by_calibration, 4)
-    if by_calibration:
-        added = fact("clock-calibrated", offset_s=f"{by_calibration:+.3f}", stated_s=f"{stated:+.3f}")
-        click.echo(" ".join(words("terminal", [added])), err=True)
-    change = {"clocks": {"camera_offset_s": stated}}
+    change = {"clocks": {"camera_offset_s": round(float(str(said["offset_s"])), 4)}}
     changed = replace(loaded, manifest=replace_in_manifest(loaded.manifest, change))
     save_flight(changed, flight, overwrite=True)
     click.echo(f'Next: wildlab check "{shown(flight)}"', err=True)
@@ -291,7 +283,8 @@ def calibrate(
     from wildlab.flight.calibration_files import write_calibration
     from wildlab.flight.checks.check import find
     from wildlab.flight.store import load_flight
-    from wildlab.reporting.georeferencing import simplest_rivals, words_of_causes
+    from wildlab.messages.catalogue import words
+    from wildlab.reporting.georeferencing import cause_message
 
     refuse_existing(out, overwrite)
     loaded = load_flight(flight)
@@ -311,27 +304,20 @@ def calibrate(
     if as_json:
         print_json(learnt.model_dump())
         return
-    gain, winner = learnt.gain, diagnosis.winner
-    possible = winner.gain.gain
+    gain = learnt.gain
     if gain is not None:
         click.echo(
-            f"{winner.name}: mean error {gain.without_m:.2f} m as logged, {gain.with_m:.2f} m on images held "
-            f"out (gain {gain.low_m:.2f} to {gain.high_m:.2f} m)."
+            f"{diagnosis.winner.name}: mean error {gain.without_m:.2f} m as logged, {gain.with_m:.2f} m on "
+            f"images held out (gain {gain.low_m:.2f} to {gain.high_m:.2f} m)."
         )
         rows = [
             [one.name, f"{one.value:+.3f}", f"{one.low:+.3f} to {one.high:+.3f}", one.unit]
             for one in learnt.parameter
         ]
         print_table(["to be added to", "estimate", "95 % interval", "unit"], rows)
-    elif winner.causes and np.isfinite(possible.low):
-        click.echo(
-            f"Possible, not certain: {words_of_causes(winner.causes)}, gain {possible.low:.2f} to "
-            f"{possible.high:.2f} m on images held out."
-        )
     else:
-        click.echo(f"No constant error is certain ({len(diagnosis.models)} models tried).")
-    if gain is None and (others := simplest_rivals(diagnosis)):
-        one, other = words_of_causes(winner.causes), words_of_causes(diagnosis.models[others[0]].causes)
-        click.echo(f"These images do not separate {one} from {other}.")
+        found = cause_message(diagnosis)
+        click.echo(" ".join(words("georeferencing", [(found.key, found.values)])))
+        click.echo(" ".join(words("terminal", [("calibrate-nothing", {})])))
     click.echo("The noise of its poses takes the place of the standard deviations that a flight states.")
     click.echo(shown(out))

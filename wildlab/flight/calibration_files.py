@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -92,6 +93,8 @@ def read_camera(path: Path) -> CameraFile:
 
 #: Focal lengths and principal points that differ by no more than this share of the focal length are the same.
 SAME_CAMERA = 1e-3
+#: Zones are whole quarters of an hour, s; offsets that differ by less than the second are the same.
+ZONE_S, SAME_CLOCK_S = 900.0, 1e-4
 Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 #: Units of the parameters, by name; the file is for people, so angles are in degrees and shares in percent.
 UNITS: dict[str, str] = {
@@ -102,7 +105,8 @@ UNITS: dict[str, str] = {
 
 
 class LearntOn(Strict):
-    """Which flight, told again by a hash of its clicks and poses, and how much of it."""
+    """Which flight, told again by a hash of its clicks and poses, how much of it, and the offset of the
+    camera's clock that it stated, which a correction of the clock is on top of."""
 
     flight: str
     source: str
@@ -110,6 +114,7 @@ class LearntOn(Strict):
     images: Annotated[int, Field(gt=0)]
     points: Annotated[int, Field(gt=0)]
     blocks: Annotated[int, Field(gt=0)]
+    camera_offset_s: float = 0.0
 
 
 class Conditions(Strict):
@@ -216,6 +221,23 @@ def write_calibration(calibration: CameraFile | Learnt, path: Path) -> None:
         write_atomic(path, calibration_toml(calibration))
     except OSError as error:
         raise system_error(error, path) from None
+
+
+def without_own_clock(manifest: Manifest, learnt: Learnt) -> Learnt:
+    """A calibration less its clock where a flight states another offset than the one it was learnt on: what a
+    flight states was found on itself. Zones are no such offset."""
+    apart = manifest.clocks.camera_offset_s - learnt.learnt_on.camera_offset_s
+    kept = [i for i, one in enumerate(learnt.parameter) if one.name != "clock"]
+    if abs(beside_zone(apart)) < SAME_CLOCK_S or len(kept) == len(learnt.parameter):
+        return learnt
+    covariance = np.array(learnt.covariance)[np.ix_(kept, kept)].tolist()
+    update = {"parameter": tuple(learnt.parameter[i] for i in kept), "covariance": covariance}
+    return learnt.model_copy(update=update)
+
+
+def beside_zone(offset_s: float) -> float:
+    """What an offset of a clock has beside whole quarters of an hour, of which zones are made, s."""
+    return math.remainder(offset_s, ZONE_S)
 
 
 def refuse_other_camera(manifest: Manifest, learnt: Learnt) -> None:

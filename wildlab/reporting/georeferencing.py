@@ -33,6 +33,7 @@ from wildlab.evaluation.correlated_errors import WanderNoise
 from wildlab.evaluation.ellipses import EllipseVerdict, is_conservative
 from wildlab.evaluation.errors import ErrorSummary, summarise
 from wildlab.evaluation.outliers import Outlier
+from wildlab.flight.calibration_files import beside_zone
 from wildlab.flight.store import Flight
 from wildlab.geometry.corrections import BORESIGHT, Calibration
 from wildlab.messages.catalogue import Message, PageTexts, load_texts, words
@@ -50,8 +51,6 @@ FEW = FEW_POINTS
 MOST = 0.5
 #: Messages of what to do, at most.
 MOST_ADVICE = 3
-#: Zones are whole quarters of an hour, s.
-ZONE_S = 900.0
 
 
 # -- tables
@@ -332,8 +331,14 @@ def cause_message(diagnosis: Diagnosis | None) -> Message:
         simplest = [diagnosis.models[m].causes for m in simplest_rivals(diagnosis)]
         others = [one for one in simplest if not set(causes) <= set(one)]
         if others:
-            rivals = listed([words_of_causes(one) for one in others], "or")
-            return Message("cause-inseparable", {**values, "others": rivals})
+            common = diagnosis.certain
+            own, *rivals = ([one for one in of if one not in common] for of in (causes, *others))
+            values |= {
+                "common": words_of_causes(common),
+                "causes": words_of_causes(own),
+                "others": listed([words_of_causes(one) for one in rivals], "or"),
+            }
+            return Message("cause-common" if common else "cause-inseparable", values)
         return Message("cause-possible", values)
     return Message(
         "cause-most" if share >= MOST else "cause-part" if share >= WORTH else "cause-small", values
@@ -459,8 +464,7 @@ def limits(
 ) -> list[Message]:
     """What the page does not tell: what always holds last, of the others those that apply; five at most."""
     manifest, diagnosis = flight.manifest, found.diagnosis
-    offset = manifest.clocks.camera_offset_s
-    rest = offset - ZONE_S * round(offset / ZONE_S)
+    rest = beside_zone(manifest.clocks.camera_offset_s)
     by_truth = int((found.points["ground"] == "truth").sum())
     timed = manifest.time.kind == "utc" and "frame_id" not in flight.pose_source(source)[1]
     conditional: tuple[tuple[str, bool, dict[str, Any]], ...] = (

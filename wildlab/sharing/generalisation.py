@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from wildlab.analysis.navigate import REFERENCES
 from wildlab.analysis.overview import ground_height
 from wildlab.errors import WildlabError
-from wildlab.flight.calibration_files import Learnt
+from wildlab.flight.calibration_files import Learnt, beside_zone
 from wildlab.flight.clocks import poses_at
 from wildlab.flight.manifest import (
     CameraPart,
@@ -145,10 +145,6 @@ def rename_identifiers(table: pd.DataFrame, names: Names, schema: str) -> pd.Dat
     return kept
 
 
-#: Offsets of clocks are cut by whole quarters of an hour, which zones of time are made of, s.
-QUARTER = 900.0
-
-
 class Neutral(NamedTuple):
     """Settings as a copy has them, and the sensors that they no longer speak of, as they do not exist."""
 
@@ -164,7 +160,7 @@ def whole_quarters(offset_s: float) -> float:
     >>> whole_quarters(7198.5), whole_quarters(-0.5)
     (7200.0, 0.0)
     """
-    return offset_s - math.remainder(offset_s, QUARTER)
+    return offset_s - beside_zone(offset_s)
 
 
 def neutral_hulls(targets: dict[str, Any]) -> None:
@@ -426,7 +422,7 @@ def generalise(flight: Flight, treatment: Treatment, name: str = "flight") -> Ge
     cell = None if treatment.cell_deg is None else cell_of(lat, lon, treatment.cell_deg, reach(flight, shift))
     there = NOWHERE if cell is None else (cell.latitude_deg, cell.longitude_deg)
     names = learn_names(flight.nav, flight.tables, manifest.sensors)
-    clocks = {key: math.remainder(value, QUARTER) for key, value in manifest.clocks.model_dump().items()}
+    clocks = {key: beside_zone(value) for key, value in manifest.clocks.model_dump().items()}
     folded = {key: value - clocks[key] for key, value in manifest.clocks.model_dump().items()}
     start = first_stamp(flight)
     nav = {
@@ -584,7 +580,9 @@ def _moved_pixels(table: pd.DataFrame, true: CameraPart, made: CameraPart, more:
 def neutral_learnt(learnt: Learnt, made: Generalised) -> Learnt:
     """A calibration from another flight for a generalised one, without that flight's name and fingerprint."""
     data = learnt.model_dump(exclude_none=True)
-    data["learnt_on"] |= {"flight": "another", "source": "poses", "fingerprint": _NOBODY}
+    clock = beside_zone(learnt.learnt_on.camera_offset_s)
+    nobody = {"flight": "another", "source": "poses", "fingerprint": _NOBODY, "camera_offset_s": clock}
+    data["learnt_on"] |= nobody
     camera = made.flight.manifest.camera
     data["camera"] = {**data["camera"], "name": "camera"} if camera is None else camera.model_dump()
     scale_pixels(data["noise"], made.pixels)
