@@ -1,14 +1,17 @@
 """Autocorrelation against its definition and against processes whose answer is known."""
 
 import numpy as np
+import pytest
+from scipy.signal import lfilter
 from scipy.stats import chi2, kstest
 
 from wildlab.evaluation.consistency import (
     autocorrelation,
-    effective_sample_size,
+    average,
     innovation_whiteness,
     portmanteau,
     white_bound,
+    worth,
 )
 
 
@@ -49,7 +52,25 @@ def test_a_first_order_process_is_found_coloured():
     x = first_order(5000, 0.8, np.random.default_rng(2))
     assert np.allclose(autocorrelation(x, 5), 0.8 ** np.arange(6), atol=0.05)
     assert portmanteau(x[:, None], 20)[1] < 1e-6
-    assert np.isclose(effective_sample_size(x, 200) / 5000, 0.2 / 1.8, rtol=0.25)
+    assert np.isclose(worth(x) / 5000, 0.2 / 1.8, rtol=0.25)
+
+
+def test_what_lasts_beneath_white_noise_is_counted():
+    """Half of the variance falls by e in fifty samples: neighbours hardly go together, sums do."""
+    rng = np.random.default_rng(4)
+    found = [worth(first_order(20000, 0.98, rng) + rng.normal(size=20000)) / 20000 for _ in range(5)]
+    assert np.isclose(np.mean(found), 1 / (1 + 0.98 / 0.02), rtol=0.3)
+
+
+@pytest.mark.parametrize(("rho", "n"), [(0.5, 50), (0.9, 50), (0.9, 200), (0.97, 50), (0.97, 2000)])
+def test_the_band_of_a_mean_holds_that_of_a_consistent_filter(rho, n):
+    """Errors of a first-order process, 500 runs: sums of autocorrelations alone hold 75 % of short ones."""
+    noise = np.sqrt(1 - rho**2) * np.random.default_rng(n).normal(size=(500, n + 300, 2))
+    errors = lfilter([1], [1, -rho], noise, axis=1)[:, 300:]
+    runs = [average(nees, 2, worth(nees)) for nees in (errors**2).sum(axis=2)]
+    assert 0.92 < np.mean([run.inside for run in runs]) < 0.99
+    # It is no wider than it has to be.
+    assert np.median([run.worth for run in runs]) > 0.5 * n * (1 - rho**2) / (1 + rho**2)
 
 
 def test_portmanteau_of_one_element_is_ljung_and_box():

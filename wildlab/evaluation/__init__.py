@@ -6,7 +6,7 @@ NEES and NIS are not divided by their degrees of freedom. H is H. H. Helgesen, D
 Floating Objects using UAVs with Optical Sensors, doctoral thesis, NTNU 2019.
 
 - `nees`, `nis`, `average`, `chi_square_interval`: is a filter consistent?
-- `innovation_whiteness`, `autocorrelation`, `effective_sample_size`: are its innovations white?
+- `innovation_whiteness`, `autocorrelation`, `worth`: are its innovations white?
 - `track_errors`, `summarise_track`: how far is a track from the truth?
 - `gospa`: how far is a set of tracks? `compare_identities`: who follows whom, how long, and how well.
 - `estimate_position_noise`: how rough is the truth itself?

@@ -30,7 +30,7 @@ def chi_square_interval(dof: float, probability: float = 0.95, runs: float = 1) 
     runs
         Of how many independent runs the value is the mean; their sum has ``runs * dof`` degrees of freedom.
         For a mean over the time of one run: as many as its correlated values are worth, which need not be
-        whole (`wildlab.evaluation.consistency.effective_sample_size`).
+        whole (`wildlab.evaluation.consistency.worth`).
 
     Returns
     -------
@@ -353,29 +353,6 @@ def white_bound(n: int, level: float = 0.95) -> float:
     return float(normal_quantile((1 + level) / 2) / np.sqrt(n))
 
 
-def effective_sample_size(series: ArrayLike, max_lag: int) -> float:
-    """How many independent samples a correlated series is worth for its mean.
-
-    ``T / (1 + 2 sum of autocorrelations)``, summed up to the first one that is not positive.
-
-    Parameters
-    ----------
-    series
-        (T,) at equal intervals, without NaN.
-    max_lag
-        The largest lag that is summed, counted in samples.
-
-    Returns
-    -------
-    At most T.
-    """
-    x = np.asarray(series, float)
-    r = autocorrelation(x, max_lag)[1:]
-    first = np.flatnonzero(~(r > 0))
-    r = r[: first[0]] if len(first) else r
-    return float(len(x) / (1 + 2 * r.sum()))
-
-
 class Whiteness(NamedTuple):
     """Whether a sequence of innovations is white.
 
@@ -478,6 +455,10 @@ class Series(NamedTuple):
 def worth(values: ArrayLike) -> float:
     """How many independent values those of one run (N,) are worth for their mean; NaN are left out.
 
+    ``N / (1 + 2 sum of autocorrelations)``, summed up to the first one that is not positive; at most that of
+    a first-order process, since in a short series these sums are too small. Its coefficient is the first
+    autocorrelation without its bias (Kendall 1954), and larger by one standard error.
+
     Parameters
     ----------
     values
@@ -495,9 +476,14 @@ def worth(values: ArrayLike) -> float:
     """
     array = np.asarray(values, float)
     known = array[np.isfinite(array)]
-    if len(known) < 4 or np.ptp(known) == 0:
-        return float(len(known))
-    return float(np.clip(effective_sample_size(known, len(known) - 1), 1.0, len(known)))
+    n = len(known)
+    if n < 4 or np.ptp(known) == 0:
+        return float(n)
+    r = autocorrelation(known, n - 1)[1:]
+    within = np.cumprod(r > 0) @ r
+    first = min(r[0] + (1 + 3 * r[0]) / n + np.sqrt((1 - r[0] ** 2) / n), 1.0)
+    share = min(1 / (1 + 2 * within), (1 - first) / (1 + first))
+    return float(np.clip(n * share, 1.0, n))
 
 
 def mean_of_runs(runs: Sequence[Series]) -> Average:

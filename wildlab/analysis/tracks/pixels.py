@@ -20,9 +20,9 @@ from wildlab.evaluation.consistency import (
     autocorrelation,
     average,
     chi_square_interval,
-    effective_sample_size,
     position_nees,
     share_inside,
+    worth,
 )
 from wildlab.evaluation.errors import summarise_track, track_errors
 from wildlab.flight.clocks import frame_times, truth_at
@@ -348,7 +348,7 @@ def evaluate_track(
     }
     distance = np.hypot(*(seen.truth - state)[:, :2].T)
     known, measured = np.flatnonzero(np.isfinite(values)), np.isfinite(distance) & seen.detected
-    band = average(values, 2, _worth(values[known]))
+    band = average(values, 2, worth(values[known]))
     numbers |= {
         "error_at_end": float(distance[known[-1]]) if len(known) else math.nan,
         "p95_measured": float(np.quantile(distance[measured], 0.95)) if measured.any() else math.nan,
@@ -359,13 +359,6 @@ def evaluate_track(
     for i, axis in enumerate(axes):
         numbers[f"lag1_autocorrelation_{axis}"] = float(autocorrelation(innovation[:, i], 1)[1])
     return Scored(values, track.nis, numbers)
-
-
-def _worth(values: Array) -> float:
-    """How many independent values a NEES over time is worth; one where that cannot be told."""
-    if len(values) < 3 or np.ptp(values) == 0:
-        return 1.0
-    return max(1.0, effective_sample_size(values, len(values) - 1))
 
 
 def evaluate_measurements(seen: PixelMeasurements) -> dict[str, float]:

@@ -48,10 +48,10 @@ from wildlab.evaluation.consistency import (
     autocorrelation,
     average,
     chi_square_interval,
-    effective_sample_size,
     nees,
     share_inside,
     whiten,
+    worth,
 )
 from wildlab.evaluation.errors import summarise_track, track_errors
 from wildlab.evaluation.intervals import share_interval
@@ -444,12 +444,6 @@ def verdict(mean: Average) -> str:
     if mean.n < FEWEST_SCANS:
         return UNKNOWN
     return CONSISTENT if mean.inside else OVERCONFIDENT if mean.mean > mean.high else CAUTIOUS
-
-
-def worth(values: Array) -> float:
-    """How many independent values a series with NaN is worth."""
-    known = values[np.isfinite(values)]
-    return effective_sample_size(known, len(known) - 1) if len(known) > 3 else float(len(known))
 
 
 def mean_of(values: Array, dof: float) -> Average:

@@ -40,8 +40,9 @@ from wildlab.analysis.tracks.scans import (
     truths_at,
 )
 from wildlab.analysis.tracks.single_target import choose
-from wildlab.analysis.tracks.tracker import read_inputs, worth
+from wildlab.analysis.tracks.tracker import read_inputs
 from wildlab.errors import WildlabError
+from wildlab.evaluation.consistency import worth
 from wildlab.flight.manifest import Settings
 from wildlab.flight.store import Flight
 from wildlab.geometry.compilation import compiled
