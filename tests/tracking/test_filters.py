@@ -17,7 +17,14 @@ from wildlab.tracking import sensors as m
 from wildlab.tracking.filters import run_coloured, run_imm, run_unscented, thin
 from wildlab.tracking.kalman import Considered, errors_of
 from wildlab.tracking.motion import constant_velocity, rest, singer, white_acceleration
-from wildlab.tracking.run import Start, run_filter, smooth, start_from_first
+from wildlab.tracking.run import (
+    Start,
+    lasting_errors,
+    run_filter,
+    smooth,
+    smooth_moments,
+    start_from_first,
+)
 from wildlab.tracking.sensors import predict_range_bearing
 
 ROUGH = partial(constant_velocity, sd_acceleration=0.3)
@@ -318,6 +325,16 @@ def test_a_start_without_variance_and_one_row():
     begun = Start(0.0, np.zeros(2), np.eye(2), row=0)
     found = run_smoothed([0.0], np.ones((1, 2)), np.eye(2), m.positions(), rest, begun)
     np.testing.assert_allclose(found.x, 0.0)
+
+
+def test_a_moment_after_which_less_is_known_says_nothing_of_earlier_ones():
+    """As where a track is begun again: its covariance exceeds the prediction, and carries nothing back."""
+    x, P = np.array([[0.0, 0, 1, 0], [9.0, 9, 5, 5]]), np.stack([np.eye(4), np.eye(4)])
+    F, Q = CV(1.0)
+    P[1] = 2 * (F @ P[0] @ F.T + Q)
+    found = smooth_moments(np.arange(2.0), x, P, np.zeros((2, 4, 0)), CV, lasting_errors((), 2))
+    np.testing.assert_allclose(found[0], x, atol=1e-9)
+    np.testing.assert_allclose(found[1], P, atol=1e-9)
 
 
 def test_rows_whose_pose_is_not_known():

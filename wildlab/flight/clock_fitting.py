@@ -151,7 +151,7 @@ def _under(dx: Array, dy: Array, at_0: float, rate: float) -> _Line:
     # Far outliers first: they would be the whole line.
     left = dy - at_0 - rate * dx
     low = float(np.quantile(left, 0.05)) if len(left) > 20 else -np.inf
-    kept = left >= 4 * low - 2 * RESOLUTION_S if low < 0 else np.ones(len(left), bool)
+    kept = left >= 2 * low - 2 * RESOLUTION_S if low < 0 else np.ones(len(left), bool)
     above_0, slope, slope_sd = lower_line(dx[kept], left[kept])
     used = kept & (left - above_0 - slope * dx >= -1e-6)
     return at_0 + above_0, rate + slope, used, slope_sd

@@ -40,9 +40,11 @@ Sensitivity = Literal["open", "generalised", "withheld"]
 class LocationsPart(Strict):
     """How sensitive the places are: whoever shares a report decides by this. Denied unless stated.
 
-    ``sensitivity`` says what reports print. ``category`` is that of GBIF's guide to sensitive species, from 1
-    (place withheld) to 4 (0.001 degrees), and says what copies for others give; ``agreed_category`` is what
-    was agreed for partners. Left out, ``data/sharing/tiers.toml`` says what is assumed.
+    Where ``sensitivity`` is not "open", neither the flight's own reports nor its checks print coordinates,
+    and parts of it and other programs have numbers; targets keep their names but in copies for others.
+    ``category`` is that of GBIF's guide to sensitive species, from 1 (place withheld) to 4 (0.001 degrees),
+    and says what copies for others give; ``agreed_category`` is what was agreed for partners. Left out,
+    ``data/sharing/tiers.toml`` says what is assumed.
     """
 
     sensitivity: Sensitivity = "withheld"
