@@ -18,6 +18,7 @@ from wildlab.analysis.tracks.tracker import read_inputs
 from wildlab.errors import WildlabError
 from wildlab.flight.calibration_files import parse_learnt, read_learnt, write_calibration
 from wildlab.flight.checks.check import find
+from wildlab.flight.checks.findings import Finding
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import load_flight, save_flight
 from wildlab.messages.catalogue import Message, load_texts
@@ -180,3 +181,19 @@ def test_a_clock_that_a_check_finds_off_is_what_is_to_be_learnt(tmp_path, monkey
     save_flight(late, tmp_path / "late")
     learn(monkeypatch)
     succeed("calibrate", tmp_path / "late", "--out", tmp_path / "c.toml")
+
+
+@pytest.mark.parametrize(
+    ("causes", "learns"),
+    [
+        (("clock of the camera", "camera turned"), True),
+        (("clock of the camera", "attitude: sign of roll"), False),
+        ((), False),
+    ],
+)
+def test_only_what_is_estimated_better_may_be_found_by_a_check(folder, tmp_path, monkeypatch, causes, learns):
+    learn(monkeypatch)
+    found = Finding("problem", "nav/logged", "", "points-missed", {"metres": 9.0, "angle": 9.0}, causes)
+    monkeypatch.setattr("wildlab.flight.checks.check.find", lambda *_, **__: [found])
+    call = ("calibrate", folder / "short", "--out", tmp_path / "c.toml")
+    assert succeed(*call) if learns else "contradict" in refuse(*call)

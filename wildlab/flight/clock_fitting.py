@@ -264,7 +264,7 @@ def lower_line(x: Array, y: Array) -> tuple[float, float, float]:
     middle = A.mean(axis=0)
 
     def under(rows: Indices) -> Array:
-        aim = np.clip(middle, A[rows].min(axis=0), A[rows].max(axis=0))  # else it has no bound
+        aim = A[rows].mean(axis=0)  # between them: else it has no bound
         return np.array(linprog(-aim, A[rows], y[rows], bounds=(None, None)).x, float)
 
     line = first = best = under(near)
