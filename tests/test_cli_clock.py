@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
 from click.testing import CliRunner
 
@@ -27,7 +26,7 @@ from wildlab.flight.store import load_flight, save_flight
 
 def clock(sentence: str, certain: bool) -> CameraClock:
     facts = (("detect-note", {"note": f"{sentence} say so"}),)
-    return CameraClock({"certain": certain, "method": sentence}, pd.DataFrame(), facts)
+    return CameraClock({"certain": certain, "method": sentence}, facts)
 
 
 @pytest.mark.parametrize(

@@ -55,8 +55,6 @@ def test_within_20_ms_from_known_points(tracking):
     # Half of it of four times as many sightings.
     assert sd < 0.020 and abs(offset - shift) < 4 * sd
     assert found.numbers["certain"]
-    best = found.curve["offset_s"][found.curve["cost"].idxmin()]
-    assert best == pytest.approx(shift, abs=0.1)
 
 
 @pytest.mark.slow
@@ -112,8 +110,6 @@ def test_from_the_motion_of_images(antenna):
     assert found.numbers["certain"], found.facts
     assert found.numbers["offset_s"] == pytest.approx(1.3, abs=0.030)
     assert found.numbers["gain"] == pytest.approx(1.0, abs=0.3)
-    at = found.curve["correlation"].idxmax()
-    assert found.curve["offset_s"][at] == pytest.approx(1.3, abs=0.05)
 
 
 @pytest.mark.slow
@@ -153,17 +149,15 @@ def test_repeated_stamps_of_the_gyro_change_nothing(antenna):
 
 
 @pytest.mark.slow
-def test_the_command_writes_a_curve_and_sets_the_offset(tracking, tmp_path):
-    folder, curve = tmp_path / "flight", tmp_path / "curve.csv"
+def test_the_command_sets_the_offset(tracking, tmp_path):
+    folder = tmp_path / "flight"
     save_flight(late(tracking, 0.25), folder)
 
     def run(*options: str) -> Result:
         return CliRunner().invoke(wildlab, ["clock", str(folder), *options])
 
-    assert run("--source", "autopilot", "--set", "--curve", str(curve)).exit_code == 0
+    assert run("--source", "autopilot", "--set").exit_code == 0
     assert load_flight(folder).manifest.clocks.camera_offset_s == pytest.approx(0.25, abs=0.020)
-    table = pd.read_csv(curve)
-    assert table["offset_s"][table["cost"].idxmin()] == pytest.approx(0.25, abs=0.1)
     assert run("--offset", "0.5", "--set").exit_code == 0
     assert load_flight(folder).manifest.clocks.camera_offset_s == 0.5
-    assert isinstance(run("--offset", "1", "--curve", str(curve)).exception, WildlabError)
+    assert isinstance(run("--offset", "1", "--images", str(tmp_path)).exception, WildlabError)

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.analysis import Fact, fact
@@ -527,14 +526,8 @@ def clock_from_points(flight: Flight, source: str | None = None) -> CameraClock:
             field="detections",
         )
 
-    def costs(offsets: Array) -> Array:
-        return np.array([sighting_cost(seen.shifted(float(by))) for by in offsets])
-
-    far = costs(NEAR_CLOCKS)
-    top = float(NEAR_CLOCKS[np.argmin(far)])
-    near = top + np.arange(-1.0, 1.01, 0.05)
-    offsets, cost = np.append(NEAR_CLOCKS, near), np.append(far, costs(near))
-    best = float(offsets[np.argmin(cost)])
+    cost = np.array([sighting_cost(seen.shifted(float(by))) for by in NEAR_CLOCKS])
+    best = float(NEAR_CLOCKS[np.argmin(cost)])
     begun = best if abs(best) > APART_S else 0.0
     observations = observe(flight, name, clock_shift=begun)
     scored = score_points(flight, georeference(observations, np.random.default_rng(0)))
@@ -548,23 +541,19 @@ def clock_from_points(flight: Flight, source: str | None = None) -> CameraClock:
             field="frames",
         )
     k, offset = model.fit.names.index("clock"), begun + model.value("clock")
-    apart = np.where(np.abs(offsets - best) > APART_S, cost, np.inf)
-    blocks, rival = len(np.unique(found.blocks)), float(offsets[np.argmin(apart)])
-    alone = blocks * (apart.min() - cost.min()) > CERTAIN
+    apart = np.where(np.abs(NEAR_CLOCKS - offset) > APART_S, cost, np.inf)
+    blocks, rival = len(np.unique(found.blocks)), float(NEAR_CLOCKS[np.argmin(apart)])
+    margin = blocks * (apart.min() - sighting_cost(seen.shifted(offset)))
+    alone = margin > CERTAIN and abs(offset) < NEAR_CLOCKS[-1] - APART_S
+    clocks = (begun + one.value("clock") for one in (found.winner, *found.rivals))
+    other = max(clocks, key=lambda clock: abs(clock - offset))
     if alone:
-        others = (begun + one.value("clock") for one in (found.winner, *found.rivals))
-        rival = max(others, key=lambda other: abs(other - offset))
-        alone = abs(rival - offset) <= SAME_S
-    numbers: dict[str, float] = {
-        "offset_s": offset,
-        "sd_s": float(np.hypot(np.sqrt(model.covariance[k, k]), alone * (rival - offset))),
-        "rival_s": rival,
-    }
+        alone, rival = abs(other - offset) <= SAME_S, other
+    sd = float(np.hypot(np.sqrt(model.covariance[k, k]), other - offset))
+    numbers = {"offset_s": offset, "sd_s": sd, "rival_s": rival}
     rests = {"points": len(scored), "images": int(scored["frame_id"].nunique()), "blocks": blocks}
-    order = np.argsort(offsets, kind="stable")
-    curve = pd.DataFrame({"offset_s": offsets[order], "cost": cost[order]})
     doubt = "misfit" if not found.fits else "" if alone else "open"
-    return _told(flight, "points", numbers, doubt, rests, curve)
+    return _told(flight, "points", numbers, doubt, rests)
 
 
 def image_motions(frames: Iterable[Frame], flight: Flight, camera: Camera) -> tuple[Indices, Array]:
@@ -640,10 +629,9 @@ def clock_from_motions(
             field="frames",
         )
     rests = {"pairs": found.pairs, "correlation": found.peak, "rival_correlation": found.rival_correlation}
-    curve = pd.DataFrame({"offset_s": found.offsets, "correlation": found.correlation})
     estimate = {name: getattr(found, name) for name in ("offset_s", "sd_s", "rival_s")}
     doubt = "" if found.certain else "open"
-    return _told(flight, "motion", estimate, doubt, rests | {"gain": found.gain}, curve)
+    return _told(flight, "motion", estimate, doubt, rests | {"gain": found.gain})
 
 
 def clock_from_images(flight: Flight, frames: Iterable[Frame], source: str | None = None) -> CameraClock:
@@ -696,14 +684,11 @@ class CameraClock(NamedTuple):
     numbers
         ``offset_s``, ``sd_s``, ``certain``, ``method``, the next best offset
         ``rival_s`` and what the estimate rests on.
-    curve
-        ``offset_s``, and ``cost`` or ``correlation``.
     facts
         What is said of it; the words are in ``data/messages/en/terminal.toml``.
     """
 
     numbers: dict[str, object]
-    curve: pd.DataFrame
     facts: tuple[Fact, ...]
 
 
@@ -713,7 +698,6 @@ def _told(
     estimate: dict[str, float],
     doubt: str,
     rests: Mapping[str, float],
-    curve: pd.DataFrame,
 ) -> CameraClock:
     stated = flight.manifest.clocks.camera_offset_s
     offset_s, rival_s = (estimate[name] + stated for name in ("offset_s", "rival_s"))
@@ -728,4 +712,4 @@ def _told(
     shown = {name: f"{one:.2f}" if isinstance(one, float) else str(one) for name, one in rests.items()}
     shown |= {"offset_s": f"{offset_s:+.3f}", "rival_s": f"{rival_s:+.3f}", "sd_s": f"{estimate['sd_s']:.3f}"}
     said = fact(f"clock-{way}-{doubt or 'certain'}", **shown)
-    return CameraClock(numbers, curve.assign(offset_s=curve["offset_s"] + stated), (said,))
+    return CameraClock(numbers, (said,))

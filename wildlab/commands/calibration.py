@@ -151,7 +151,6 @@ def _interval(*values: float) -> tuple[str, str]:
 @click.option("--offset", type=float, help="Seconds, in place of an estimate.")
 @click.option("--set", "set_", is_flag=True, help="Write the offset into the flight.")
 @shared.source
-@click.option("--curve", type=FILE, help="CSV file: how well each offset fits.")
 @shared.as_json
 def clock(
     flight: Path,
@@ -159,7 +158,6 @@ def clock(
     offset: float | None,
     set_: bool,
     source: str | None,
-    curve: Path | None,
     as_json: bool,
 ) -> None:
     """Estimate or set the offset of the camera's clock.
@@ -167,23 +165,21 @@ def clock(
     It is what has to be added to the stamps of FLIGHT's images. With --images, from the motion of the images
     against the turning that the log has; without, or where that does not tell it, from known points that were
     seen. --offset takes a number that is known otherwise (F 6.3.3). An offset that does not stand out is said
-    to be uncertain, and --set refuses it. What a calibration that the flight keeps adds to the stamps is not
-    set again.
+    to be uncertain, and --set refuses it. One that is set takes the place of the clock of a calibration.
 
     \b
     Examples:
       wildlab clock flights/tuesday
-      wildlab clock flights/tuesday --images card/DCIM --curve curve.csv --set
+      wildlab clock flights/tuesday --images card/DCIM --set
       wildlab clock flights/tuesday --offset 0.42 --set
     """
     from wildlab.analysis import Fact, fact
-    from wildlab.files import write_csv
     from wildlab.flight.store import load_flight
     from wildlab.messages.catalogue import words
 
     loaded = load_flight(flight)
     if offset is not None:
-        if images is not None or curve is not None:
+        if images is not None:
             raise WildlabError(
                 "an offset is stated and an estimate asked for", "leave one out", field="--offset"
             )
@@ -191,8 +187,6 @@ def clock(
         facts: tuple[Fact, ...] = (fact("clock-stated", offset_s=f"{offset:+.3f}"),)
     else:
         found = _estimate(loaded, images, source)
-        if curve is not None:
-            write_csv(curve, found.curve)
         said, facts = found.numbers, found.facts
     sentence = " ".join(words("terminal", facts))
     if as_json:
