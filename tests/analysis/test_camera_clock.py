@@ -57,13 +57,12 @@ def test_within_20_ms_from_known_points(tracking):
 
 
 @pytest.mark.slow
-def test_the_uncertainty_is_honest_where_the_attitude_wanders(antenna):
-    """One degree for half a minute at 350 m: more than the clock's 20 ms can be told from."""
+def test_a_wandering_attitude_beside_a_turned_camera_hardly_moves_it(antenna):
+    """One degree for half a minute at 350 m, in the noise of the diagnosis."""
     found = clock_from_points(late(antenna, 0.8), "autopilot-uncalibrated")
     offset, sd = found.numbers["offset_s"], found.numbers["sd_s"]
     assert found.numbers["certain"]
-    assert 0.02 < sd < 0.1
-    assert abs(offset - 0.8) < 3 * sd
+    assert sd < 0.02 and abs(offset - 0.8) < 3 * sd
     # An offset that the manifest states is part of the one that is found.
     stated = changed(late(antenna, 0.8), {"clocks": {"camera_offset_s": 0.5}})
     true = clock_from_points(stated, "truth")
