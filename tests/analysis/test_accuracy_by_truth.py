@@ -14,7 +14,7 @@ N = 40
 
 
 def walked(mark_sd: float = 0.02, walker_sd: float = 3.0, lasts: int = N) -> Flight:
-    """One of the four marks in each image is where a walker was, whose receiver errs alike for some images."""
+    """One of the four marks in each image is of a walker, whose receiver errs alike for a while."""
     flight = build(pixel_px=2.0, attitude_deg=0.3)
     truth, detections = flight.table("truth"), flight.table("detections").copy()
     walker = np.arange(len(truth)) % 4 == 3

@@ -6,7 +6,6 @@ from types import MappingProxyType, SimpleNamespace
 
 import numpy as np
 import pandas as pd
-import pytest
 
 from wildlab.reporting import georeferencing
 from wildlab.reporting.georeferencing import truth_errors, worst_sightings

@@ -62,7 +62,6 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.corrections import Calibration, apply_calibration, calibrated_camera
 from wildlab.geometry.covariances import tilt_and_heading
 from wildlab.geometry.frames import (
-    Array,
     euler_to_matrix,
     matrix_to_euler,
     matrix_to_quaternion,

@@ -16,6 +16,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from wildlab.analysis.accuracy import observe_calibrated
+from wildlab.analysis.georeference import FEW_POINTS
 from wildlab.analysis.overview import ALARMS, TROUBLES, Alarm, Gain, look_over
 from wildlab.analysis.verdict import (
     MOST,
@@ -46,7 +47,6 @@ from wildlab.messages.catalogue import (
 )
 from wildlab.messages.quantities import nice_length
 from wildlab.reporting.front_page import OwnFlight
-from wildlab.reporting.georeferencing import FEW
 from wildlab.reporting.text import POLICY, mark_up, read_style, render
 from wildlab.reporting.tracking import NEAR_THE_BAND, band_name
 from wildlab.sharing.tiers import Cell
@@ -384,7 +384,7 @@ def _next(facts: Facts, advice: Sequence[Message]) -> Message:
 
 
 def _tiles(facts: Facts) -> list[tuple[Value, Message]]:
-    known, few = math.isfinite, facts.compared < FEW
+    known, few = math.isfinite, facts.compared < FEW_POINTS
     worst = {"worst": length(facts.track_worst)}
     tracks = Message("tile.tracks", worst) if _unlike(facts) else Message("tile.track")
     pictured = not known(facts.pictured) or facts.pictured == facts.seen
@@ -399,7 +399,7 @@ def _tiles(facts: Facts) -> list[tuple[Value, Message]]:
 
 
 def _measured(facts: Facts) -> list[Message]:
-    known, few, others = math.isfinite, facts.compared < FEW, facts.other_sensors
+    known, few, others = math.isfinite, facts.compared < FEW_POINTS, facts.other_sensors
     named, placed = known(facts.things), not others and facts.seen > 0 and known(facts.placed)
     seen = {"seen": number(facts.seen), "placed": number(facts.placed)}
     off = {"error": length(facts.track_error), "worst": length(facts.track_worst)}
@@ -520,7 +520,7 @@ def _advice(facts: Facts) -> list[Message]:
         found.append(Message("do.possible", {"gain": length(facts.possible.value)}))
     found += _applying(
         (unplaced, Message("do.known_tracks" if others else "do.known_places")),
-        (0 < compared < FEW, Message("do.more_places", {"few": number(FEW)})),
+        (0 < compared < FEW_POINTS, Message("do.more_places", {"few": number(FEW_POINTS)})),
         (bool(facts.failed), Message("do.failed", {}, len(facts.failed))),
     )
     # What a gain asks for already is not asked for twice.
@@ -553,11 +553,11 @@ def _unknown(facts: Facts) -> list[Message]:
         *(Message(f"unknown.failed_{part}") for part in facts.failed),
         *_applying(
             (unplaced, Message("unknown.error_sightings" if facts.tracked else "unknown.error")),
-            (0 < facts.compared < FEW, Message("unknown.few", few, facts.compared)),
+            (0 < facts.compared < FEW_POINTS, Message("unknown.few", few, facts.compared)),
             (not seen, Message("unknown.seen")),
             (seen and not math.isfinite(facts.things), Message("unknown.things")),
             (seen, Message("unknown.hidden_detected" if facts.other_sensors else "unknown.hidden")),
-            (facts.compared >= FEW, Message("unknown.another_day")),
+            (facts.compared >= FEW_POINTS, Message("unknown.another_day")),
         ),
     ]
 
