@@ -494,6 +494,11 @@ def show_advice(report: Report, said: Sequence[str]) -> None:
         report.points(said, ordered=True)
 
 
+def count_problems(amiss: Sequence[str]) -> int:
+    """How many of what does not fit together are problems."""
+    return sum(one.startswith("problem") for one in amiss)
+
+
 def show_contradictions(report: Report, amiss: Sequence[str]) -> None:
     """What does not fit together in the flight: these sentences hold no coordinates, but names of targets."""
     if amiss:
@@ -543,7 +548,7 @@ def show_accuracy(
         record_errors(report, f"logged-pose/{name}", part)
     wording = Wording(report, texts)
     report.head(texts.subjects["question"], _subtitle(flight, found))
-    problems = sum(one.startswith("problem") for one in amiss)
+    problems = count_problems(amiss)
     show_summary(report, wording, found, problems, calibrated_elsewhere=bool(applied))
     if applied:
         report.text(" ".join(words("georeferencing", applied)))
@@ -729,7 +734,7 @@ def show_repeats(report: Report, flight: Flight, found: Repeats, amiss: Sequence
     spread, diagnosis, total = found.spread, found.diagnosis, len(found.points)
     images = found.points["frame_id"].nunique()
     report.head(texts.subjects["question"], f"{images} images, {total} points, no truth")
-    word, reason = verdict_of_repeats(found, sum(one.startswith("problem") for one in amiss))
+    word, reason = verdict_of_repeats(found, count_problems(amiss))
     said = wording.messages([answer_repeats(found)])
     cause = Wording(report, load_texts("georeferencing"))
     if diagnosis is not None and spread is not None:

@@ -34,6 +34,7 @@ from wildlab.messages.catalogue import Message, load_texts
 from wildlab.messages.quantities import NOTHING, length, significant
 from wildlab.reporting.charts import tracks as charts
 from wildlab.reporting.figures import filter_words
+from wildlab.reporting.georeferencing import count_problems, show_contradictions
 from wildlab.reporting.report import Report, Wording
 
 #: A target tracked by all sensors together may be this many times as far off as by the best one alone.
@@ -161,7 +162,7 @@ def worse_together(rows: pd.DataFrame) -> Message | None:
     return Message("worse-together", values)
 
 
-def judge_tracks(rows: pd.DataFrame, pairs: Sequence[SensorPair]) -> Verdict:
+def judge_tracks(rows: pd.DataFrame, pairs: Sequence[SensorPair], problems: int = 0) -> Verdict:
     """What the tracks come to.
 
     Parameters
@@ -170,12 +171,14 @@ def judge_tracks(rows: pd.DataFrame, pairs: Sequence[SensorPair]) -> Verdict:
         From `wildlab.analysis.tracks.tracker.score_tracks`.
     pairs
         From `wildlab.analysis.tracks.tracker.compare_sensors`.
+    problems
+        How many things in the flight contradict each other.
 
     Returns
     -------
     Verdict
     """
-    if not (rows["detections"] > 0).any():
+    if problems or not (rows["detections"] > 0).any():
         return Verdict.MEND
     mine = leading_rows(rows)
     if (rows["compared"] > 0).any():
@@ -273,8 +276,10 @@ def _beside(
     return None
 
 
-def reason(rows: pd.DataFrame) -> Message:
+def reason(rows: pd.DataFrame, problems: int = 0) -> Message:
     """Why the verdict of `judge_tracks` is what it is: what the leading filter's tracks were found to be."""
+    if problems:
+        return Message("reason-contradictions", {"problems": problems})
     if not (rows["detections"] > 0).any():
         return Message("reason-none")
     mine = leading_rows(rows)
@@ -290,6 +295,21 @@ def reason(rows: pd.DataFrame) -> Message:
 
 
 # -- tables
+
+
+def most_pressing_first(rows: pd.DataFrame) -> pd.DataFrame:
+    """Tracks of the filter that the page speaks of first; of these those that are furthest from consistent,
+    and of alike ones those with the largest error."""
+    what = "nees" if (rows["compared"] > 0).any() else "nis"
+    verdict = rows["verdict" if what == "nees" else "nis_verdict"]
+    order = pd.DataFrame(
+        {
+            "other": rows["filter"] != (leading_filter(rows) if len(rows) else ""),
+            "verdict": verdict.map([OVERCONFIDENT, CAUTIOUS, UNKNOWN, CONSISTENT].index),
+            "error": -rows["rmse" if what == "nees" else "nis"],
+        }
+    ).sort_values(["other", "verdict", "error"], kind="stable")
+    return rows.loc[order.index]
 
 
 def tracks_table(rows: pd.DataFrame) -> pd.DataFrame:
@@ -385,16 +405,22 @@ def plain(text: str) -> str:
 
 
 def show_answer(
-    report: Report, followed: TrackingResult, rows: pd.DataFrame, pairs: Sequence[SensorPair]
+    report: Report,
+    followed: TrackingResult,
+    rows: pd.DataFrame,
+    pairs: Sequence[SensorPair],
+    amiss: Sequence[str] = (),
 ) -> None:
-    """Title, answer and verdict."""
-    wording = Wording(report, load_texts("tracking"))
+    """Title, answer, verdict, and what does not fit together."""
+    wording, problems = Wording(report, load_texts("tracking")), count_problems(amiss)
     names, truth = wording.texts.subjects, bool(followed.truth)
     targets, sensors = rows["target"].nunique(), len(followed.scans)
     report.head(
         names["question" if truth else "question-innovations"], f"targets: {targets}, sensors: {sensors}"
     )
-    wording.summary(answer(rows, pairs), judge_tracks(rows, pairs), reason(rows), "tracking")
+    verdict = judge_tracks(rows, pairs, problems)
+    wording.summary(answer(rows, pairs), verdict, reason(rows, problems), "tracking")
+    show_contradictions(report, amiss)
 
 
 def show_tracks(
@@ -405,6 +431,7 @@ def show_tracks(
     pairs: Sequence[SensorPair],
     tuned: Tuned | None = None,
     source: str | None = None,
+    amiss: Sequence[str] = (),
 ) -> None:
     """Write the page.
 
@@ -420,15 +447,15 @@ def show_tracks(
         What another flight taught.
     source
         Name of the poses' ``nav`` table; None for the flight's own.
+    amiss
+        What does not fit together in the flight: `wildlab.flight.checks.check.sense_sentences`.
     """
     wording = Wording(report, load_texts("tracking"))
     record(report, rows)
-    show_answer(report, followed, rows, pairs)
+    show_answer(report, followed, rows, pairs, amiss)
     if followed.notes:
         report.points(followed.notes)
-    # Those that the page speaks of are in sight.
-    leading = rows["filter"] == (leading_filter(rows) if len(rows) else "")
-    wording.table("tracks", tracks_table(pd.concat([rows[leading], rows[~leading]])))
+    wording.table("tracks", tracks_table(most_pressing_first(rows)))
     record_restarts(report, rows)
     _show_figures(report, flight, followed, rows, source)
     limits = ["truth" if followed.truth else "innovations", "same-detections"]
