@@ -98,6 +98,8 @@ class Facts(NamedTuple):
         Reports that ask for a closer look themselves: ``georeferencing``, ``tracking``, ``navigation``.
     failed
         Those of `PARTS`, and ``overview``, that failed.
+    far_out, inside
+        Points that are outliers; share of true places in the ellipses that should hold `HELD` of them.
     flown
         Whether it is known that the sensors flew. Else they may be a boat's, or stand somewhere.
     """
@@ -128,6 +130,8 @@ class Facts(NamedTuple):
     pictured: float = NAN
     track_worst: float = NAN
     flown: bool = True
+    far_out: int = 0
+    inside: float = NAN
 
     @property
     def other_sensors(self) -> bool:
@@ -194,6 +198,8 @@ def facts_of(flight: OwnFlight) -> Facts:
         possible=None if possible is None else possible._replace(causes=causes_told(numbers)),
         failed=tuple(about for about in ("overview", *PARTS) if about in failed),
         doubted=doubted(numbers),
+        far_out=int(flight.value("points_far_out", "winner") or 0),
+        inside=value("ellipse_coverage_90", "logged-pose"),
         flown=value("height_above_ground") >= FLYING and value("path_length") >= FLYING,
     )
 
@@ -236,8 +242,8 @@ def _median(values: Iterable[float]) -> float:
     return statistics.median(known) if known else NAN
 
 
-#: A step of somebody who walks, m, and beyond how many nobody counts them.
-STEP_M, MOST_STEPS = 0.75, 200
+#: Share of true places that the ellipses should hold, and how much more or less is unlike it.
+HELD, UNLIKE_HELD = 0.9, 0.05
 #: Of two normal errors of equal spread, the median distance from the middle over that spread.
 MEDIAN_DISTANCE = math.sqrt(2 * math.log(2))
 #: Troubles by the gain that is had by doing the same.
@@ -314,28 +320,6 @@ def _cut(items: Sequence[Message]) -> tuple[Message, ...]:
     return tuple(items) if rest <= 0 else (*items[:MOST], Message("page.more", {}, rest))
 
 
-def steps_of(metres: float) -> Message | None:
-    """A length in steps, roughly; None where nobody would count them.
-
-    Parameters
-    ----------
-    metres
-        The length.
-
-    Returns
-    -------
-    Said or None
-        From 20 steps on to the nearest five, from 100 on to the nearest ten.
-    """
-    steps = metres / STEP_M
-    if not steps <= MOST_STEPS:
-        return None
-    if steps < 0.75:
-        return Message("steps.none")
-    to = 1 if steps < 20 else 5 if steps < 100 else 10
-    return Message("steps.some", {}, to * max(1, round(steps / to)))
-
-
 def _applying(*rules: tuple[bool, Message]) -> list[Message]:
     """The messages whose condition holds. One with a number that is not known may be among the rules."""
     return [message for applies, message in rules if applies]
@@ -344,7 +328,7 @@ def _applying(*rules: tuple[bool, Message]) -> list[Message]:
 def _why(facts: Facts) -> Message:
     verdict, share_worth = facts.verdict, {"share": share(WORTH)}
     worth = [gain for gain in facts.gains if gain.share >= WORTH]
-    doubts = [Message(f"why.doubt_{one}") for one in facts.doubted]
+    doubts = [_doubt(facts, one) for one in facts.doubted]
     problems = Message("wrong.problems", {}, facts.problems)
     if verdict in (Verdict.ALARM, Verdict.LOOK) and facts.alarms:
         return _alarm(facts.alarms[0])
@@ -369,6 +353,15 @@ def _why(facts: Facts) -> Message:
     if verdict in (Verdict.ALARM, Verdict.FIX):
         return Message("why.alarm")
     return Message("why.failed" if "overview" in facts.failed else "why.unjudged")
+
+
+def _doubt(facts: Facts, about: str) -> Message:
+    """Why one of `PARTS` asks for a closer look."""
+    if about == "georeferencing" and facts.far_out:
+        return Message("why.doubt_outliers", {"of": number(facts.compared)}, facts.far_out)
+    if about == "georeferencing" and abs(facts.inside - HELD) > UNLIKE_HELD:
+        return Message("why.doubt_ellipses", {"share": share(facts.inside)})
+    return Message(f"why.doubt_{about}")
 
 
 def _next(facts: Facts, advice: Sequence[Message]) -> Message:
@@ -407,7 +400,6 @@ def _measured(facts: Facts) -> list[Message]:
         "median": length(facts.error_median),
         "p90": length(facts.error_p90),
         "compared": number(facts.compared),
-        "steps": steps_of(facts.error_median) or number(NAN),
     }
     scatter = {
         "apart": length(MEDIAN_DISTANCE * facts.scatter),
@@ -467,7 +459,7 @@ def _wrong(facts: Facts) -> list[Message]:
     found = [_alarm(one) for one in facts.alarms]
     found += _applying(
         (facts.problems > 0, Message("wrong.problems", {}, facts.problems)),
-        ("georeferencing" in facts.doubted, Message("why.doubt_georeferencing")),
+        ("georeferencing" in facts.doubted, _doubt(facts, "georeferencing")),
         (sure, Message("wrong.too_sure")),
         (not sure and "tracking" in facts.doubted, Message("why.doubt_tracking")),
         ("navigation" in facts.doubted, Message("why.doubt_navigation")),
@@ -741,9 +733,6 @@ def edition_html(
         return mark_up(say(words, one))
 
     drawn = picture_html(picture, words)
-    # What a step is taken as stands where steps are.
-    values = [value for one in story.measured for value in one.values.values() if isinstance(value, Message)]
-    steps = any(value.key.startswith("steps.") for value in values)
     return (
         render(
             "edition",
@@ -767,7 +756,6 @@ def edition_html(
                 ("tell", "unknown", story.unknown),
             ],
             place=shown(_place(place, words)),
-            steps=steps,
             untranslated=Message("page.untranslated", {}, len(words.missing)) if words.missing else "",
         )
         + "\n"

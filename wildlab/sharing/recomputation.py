@@ -105,7 +105,8 @@ def sources_of(
         if not ours:
             raise WildlabError(
                 f"there is no report on this flight as it is in {reports.resolve()}",
-                f"evaluate it: {typed('wildlab evaluate', path)}",
+                f"evaluate it: {typed('wildlab evaluate', path)}; after evaluate --out FOLDER: "
+                f"{typed('wildlab share FOLDER', flight=path)}",
                 file=path,
             )
         path = ours[0]

@@ -335,14 +335,14 @@ def _refuse_leaks(pages: Mapping[str, str], target: Path, sought: SecretSearch) 
     found = sought.scan(pages)
     if not found:
         return
-    several = "; ".join(f"{one} ({one.found!r})" for one in found[:_MOST])
+    several = "; ".join(f"{one} {one.word and f'({one.word})'} in {one.found!r}" for one in found[:_MOST])
     more = f"; and {len(found) - _MOST} more" if len(found) > _MOST else ""
     named = all(one.file.startswith("the name of the file") for one in found)
     raise RunFailed(
         f"there is no copy: this was found in it: {several}{more}",
         "give the copy another name: --out FILE"
         if named
-        else "rename it in the flight, evaluate and share again; report a place or date",
+        else "rename it there, evaluate and share again; report a place or date",
         file=target,
         field="--out" if named else "",
     )
