@@ -380,6 +380,7 @@ def recompute_reports(
         calibration=applied,
         reports=reports,
         console=console,
+        ledger=False,
     )
     done = {one.name for one in source.folders}
     several = f"{source.name}{MANY}" in done
