@@ -562,7 +562,7 @@ def show_accuracy(
         _figures(report, wording, found, programs)
         report.section(texts.subjects["where"])
         worst = worst_images(found.best)
-        wording.figure("error-map", error_map(found.scored, list(worst["image"])))
+        wording.figure("error-map", error_map(found.best, list(worst["image"])))
         wording.table("worst", worst)
         if pictures:
             wording.figure("worst-pictures", sightings_chart(worst_sightings(flight, found.best), pictures))
