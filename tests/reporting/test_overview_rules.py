@@ -55,7 +55,7 @@ class Flight:
 
 
 def gain(key: str = "cause", share: float = 0.4, causes: tuple[str, ...] = ("boresight",)) -> Gain:
-    return Gain(key, causes, 2.0, 5.0, share, "images")
+    return Gain(key, causes, 2.0, 5.0, share)
 
 
 def alarm(what: str, often: int = 3) -> Alarm:

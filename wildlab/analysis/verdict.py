@@ -259,8 +259,7 @@ def metric_gains(numbers: Numbers) -> Iterable[Gain]:
     if math.isfinite(gain + left):
         yield Gain("cause", causes_told(numbers), gain, gain + left, _share(gain, gain + left))
     if points and points["value"] is not None and math.isfinite(far + kept):
-        why = f"{points['value']:.0f} of {points['n']} points"
-        yield Gain("far_out", (), far, far + kept, _share(far, far + kept), why=why)
+        yield Gain("far_out", (), far, far + kept, _share(far, far + kept))
 
 
 def number_of(numbers: Numbers, name: str, subject: str) -> float:

@@ -36,7 +36,13 @@ from wildlab.messages.catalogue import Message, load_texts
 from wildlab.messages.quantities import metres, number, percent_of
 from wildlab.names import listed
 from wildlab.reporting.charts import flights as charts
-from wildlab.reporting.georeferencing import show_advice, show_contradictions, span, words_of_causes
+from wildlab.reporting.georeferencing import (
+    count_problems,
+    show_advice,
+    show_contradictions,
+    span,
+    words_of_causes,
+)
 from wildlab.reporting.report import Report, Wording
 
 #: Subject of what is recorded of the whole flight.
@@ -89,16 +95,12 @@ def way_of(overview: Overview) -> float:
 
 def gain_message(gain: Gain) -> Message:
     """What fixing one thing gains, and how."""
-    values = {"share": percent_of(gain.share), "why": gain.why}
-    if gain.key == "cause":
-        error, left = metres(gain.of), metres(gain.of - gain.value)
-        causes = words_of_causes(gain.causes) if gain.causes else "–"
-        return Message("gain-cause", {**values, "causes": causes, "error": error, "left": left})
-    if gain.key == "far_out":
-        return Message(
-            "gain-outliers", {**values, "left": metres(gain.of - gain.value), "error": metres(gain.of)}
-        )
-    counts = {"lost": f"{gain.value:.0f}", "of": f"{gain.of:.0f}", "what": gain.what}
+    values = {"share": percent_of(gain.share)}
+    if gain.key in ("cause", "far_out"):
+        values |= {"left": metres(gain.of - gain.value), "error": metres(gain.of)}
+        values |= {"causes": words_of_causes(gain.causes) if gain.causes else "–"}
+        return Message("gain-cause" if gain.key == "cause" else "gain-outliers", values)
+    counts = {"lost": f"{gain.value:.0f}", "of": f"{gain.of:.0f}"}
     return Message(f"gain-{gain.key.replace('_', '-')}", values | counts)
 
 
@@ -387,7 +389,7 @@ def show_overview(
     """
     wording = Wording(report, load_texts("overview"))
     amiss = [*(f"problem: {one.sentence} {one.fix}" for one in overview.problems), *amiss]
-    problems = sum(one.startswith("problem") for one in amiss)
+    problems = count_problems(amiss)
     possible = possible_gain(numbers)
     counts = counts_of(overview, gains, problems, judged, possible)
     word = verdict_of(evidence_of(counts, numbers))

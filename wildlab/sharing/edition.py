@@ -215,7 +215,7 @@ def _gains(flight: OwnFlight) -> tuple[Gain, ...]:
         if name == "gain_share" and entry["value"] is not None:
             lost = overview.numbers.get(("lost", key), {"value": NAN, "n": NAN})
             gain = metres.get(key, Gain(key, (), float(lost["value"]), float(lost["n"]), 0.0))
-            found.append(gain._replace(share=float(entry["value"]), why=""))
+            found.append(gain._replace(share=float(entry["value"])))
     return tuple(sorted(found, key=lambda one: -one.share))
 
 
