@@ -41,8 +41,6 @@ from wildlab.reporting.report import Report, Wording
 ALIKE = 1.2
 #: A mean outside of its band by less than this factor may be so by chance, where few values are independent.
 NEAR_THE_BAND = 1.5
-#: Targets by sensors that are drawn; the table has all.
-MOST_DRAWN = 4
 _RECORDED = (
     # metric, column, unit, low, high, n
     ("rmse", "rmse", "m", None, None, "compared"),
@@ -461,6 +459,8 @@ def show_tracks(
     limits = ["truth" if followed.truth else "innovations", "same-detections"]
     if any(map(is_at_rest, followed.tracks)):
         limits.append("at-rest")
+    if len(rows[["sensor", "target"]].drop_duplicates()) > 1:
+        limits.append("drawn")
     report.limits(wording.messages(Message(f"limit-{one}") for one in limits))
     report.section("Details")
     wording.table("restarts", restarts_table(rows))
@@ -473,40 +473,32 @@ def show_tracks(
 def _show_figures(
     report: Report, flight: Flight, followed: TrackingResult, rows: pd.DataFrame, source: str | None
 ) -> None:
-    """Maps, and squares, errors and whiteness over time; all but those of the first target are folded."""
-    shown = rows[rows["detections"] > 0]
+    """A map, and squares, errors and whiteness over time, of the most pressing track, of a target that moves
+    if any."""
+    shown = most_pressing_first(rows[rows["detections"] > 0])
     if not len(shown):
         return
-    name = leading_filter(rows)
+    moving = {one.target for one in followed.tracks if not is_at_rest(one)}
+    first = shown.loc[(~shown["target"].isin(moving)).sort_values(kind="stable").index[0]]
+    target, sensor = first["target"], first["sensor"]
     name_of_nav, nav = flight.pose_source(source)
     platforms = {name_of_nav: nav[["north_m", "east_m"]].to_numpy(float)}
-    moving = {one.target for one in followed.tracks if not is_at_rest(one)}
-    shown = shown.sort_values("target", key=lambda names: ~names.isin(moving), kind="stable")
-    maps = []
-    for target in list(dict.fromkeys(shown["target"]))[:MOST_DRAWN]:
-        truth = np.empty((0, 2))
-        if flight.truth is not None:
-            mine = flight.truth["target_id"] == target
-            truth = flight.truth.loc[mine, ["north_m", "east_m"]].to_numpy(float)
-        maps.append(charts.map_shown(followed, target, name, truth, platforms))
-    fig, own, alt, caption = maps[0]
+    truth = np.empty((0, 2))
+    if flight.truth is not None:
+        mine = flight.truth["target_id"] == target
+        truth = flight.truth.loc[mine, ["north_m", "east_m"]].to_numpy(float)
+    fig, own, alt, caption = charts.map_shown(followed, target, leading_filter(rows), truth, platforms)
     report.figure(fig, name=own, alt=alt, caption=caption, main=True)
     report.section("Tracks")
-    if len(maps) > 1:
-        report.figures(maps[1:], fold="Maps of other targets")
-    pairs = list(dict.fromkeys(zip(shown["sensor"], shown["target"], strict=True)))
-    for i, (sensor, target) in enumerate(pairs[:MOST_DRAWN]):
-        tracks = [one for one in followed.tracks if (one.sensor, one.target) == (sensor, target)]
-        figures = [charts.squares_shown(tracks, rows, "nis")]
-        if any(np.isfinite(one.nees).any() for one in tracks):
-            errors = [charts.errors_shown(tracks, rows), charts.squares_shown(tracks, rows, "nees")]
-            figures = [*errors, *figures]
-        if sensor in followed.scans and (
-            white := charts.whiteness_shown(tracks, followed.scans[sensor].elements)
-        ):
-            figures.append(white)
-        if i == 0:
-            report.figures(figures[:2])
-            figures = figures[2:]
-        if figures:
-            report.figures(figures, fold=f"{'More of ' if i == 0 else ''}{target} by {sensor}")
+    tracks = [one for one in followed.tracks if (one.sensor, one.target) == (sensor, target)]
+    figures = [charts.squares_shown(tracks, rows, "nis")]
+    if any(np.isfinite(one.nees).any() for one in tracks):
+        errors = [charts.errors_shown(tracks, rows), charts.squares_shown(tracks, rows, "nees")]
+        figures = [*errors, *figures]
+    if sensor in followed.scans and (
+        white := charts.whiteness_shown(tracks, followed.scans[sensor].elements)
+    ):
+        figures.append(white)
+    report.figures(figures[:2])
+    if figures[2:]:
+        report.figures(figures[2:], fold=f"More of {target} by {sensor}")
