@@ -477,16 +477,6 @@ def span(values: Any) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def show_summary(
-    report: Report, wording: Wording, found: Accuracy, problems: int, *, calibrated_elsewhere: bool
-) -> None:
-    """The answer with its verdict, and what to do."""
-    wording.summary(answer(found), *verdict_of_accuracy(found, problems), "georeferencing")
-    show_advice(
-        report, wording.messages(advice(found, calibrated_elsewhere=calibrated_elsewhere, problems=problems))
-    )
-
-
 def show_advice(report: Report, said: Sequence[str]) -> None:
     """What to do, in order; nothing where there is nothing."""
     if said:
@@ -549,7 +539,9 @@ def show_accuracy(
     wording = Wording(report, texts)
     report.head(texts.subjects["question"], _subtitle(flight, found))
     problems = count_problems(amiss)
-    show_summary(report, wording, found, problems, calibrated_elsewhere=bool(applied))
+    wording.summary(answer(found), *verdict_of_accuracy(found, problems), "georeferencing")
+    remedies = advice(found, calibrated_elsewhere=bool(applied), problems=problems)
+    show_advice(report, wording.messages(remedies))
     if applied:
         report.text(" ".join(words("georeferencing", applied)))
     show_contradictions(report, amiss)

@@ -5,6 +5,7 @@ What is said follows by rules from numbers; the words lie in ``data/messages/en/
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
@@ -177,8 +178,8 @@ def reason(found: Judged, counts: Mapping[str, int]) -> Message:
 
 def advice(found: Judged) -> list[Message]:
     """What to do, the most pressing first, `MOST` at most."""
-    said = [Message(f"{one.key.removesuffix('-once')}-remedy", one.values) for one in pressing(found)]
-    return said[:MOST]
+    said = pressing(found)[:MOST]
+    return [Message(f"{re.sub('-(once|instant)$', '', one.key)}-remedy", one.values) for one in said]
 
 
 def limits(overview: Overview, lacking: Sequence[str]) -> list[Message]:

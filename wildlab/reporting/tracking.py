@@ -402,25 +402,6 @@ def plain(text: str) -> str:
 # -- the page
 
 
-def show_answer(
-    report: Report,
-    followed: TrackingResult,
-    rows: pd.DataFrame,
-    pairs: Sequence[SensorPair],
-    amiss: Sequence[str] = (),
-) -> None:
-    """Title, answer, verdict, and what does not fit together."""
-    wording, problems = Wording(report, load_texts("tracking")), count_problems(amiss)
-    names, truth = wording.texts.subjects, bool(followed.truth)
-    targets, sensors = rows["target"].nunique(), len(followed.scans)
-    report.head(
-        names["question" if truth else "question-innovations"], f"targets: {targets}, sensors: {sensors}"
-    )
-    verdict = judge_tracks(rows, pairs, problems)
-    wording.summary(answer(rows, pairs), verdict, reason(rows, problems), "tracking")
-    show_contradictions(report, amiss)
-
-
 def show_tracks(
     report: Report,
     flight: Flight,
@@ -448,9 +429,13 @@ def show_tracks(
     amiss
         What does not fit together in the flight: `wildlab.flight.checks.check.sense_sentences`.
     """
-    wording = Wording(report, load_texts("tracking"))
+    wording, problems = Wording(report, load_texts("tracking")), count_problems(amiss)
     record(report, rows)
-    show_answer(report, followed, rows, pairs, amiss)
+    title = wording.texts.subjects["question" if followed.truth else "question-innovations"]
+    report.head(title, f"targets: {rows['target'].nunique()}, sensors: {len(followed.scans)}")
+    verdict = judge_tracks(rows, pairs, problems)
+    wording.summary(answer(rows, pairs), verdict, reason(rows, problems), "tracking")
+    show_contradictions(report, amiss)
     if followed.notes:
         report.points(followed.notes)
     wording.table("tracks", tracks_table(most_pressing_first(rows)))
