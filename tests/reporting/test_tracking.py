@@ -203,6 +203,10 @@ def test_the_track_that_is_worst_stands_first_and_filters_that_do_not_lead_last(
     found = page.most_pressing_first(pd.concat([a, b, c], ignore_index=True))
     assert list(found["filter"]) == ["schmidt"] * 3 + ["ekf"] * 3
     assert list(found["target"][:3]) == ["b", "c", "a"]
+    odd = rows(target="a", nis=20.0, nis_verdict="overconfident")
+    found = page.most_pressing_first(pd.concat([c, odd], ignore_index=True))
+    assert list(found["target"][:2]) == ["a", "c"]
+    assert not len(page.most_pressing_first(rows()[:0]))
 
 
 def test_every_sentence_is_one_of_the_catalogue():

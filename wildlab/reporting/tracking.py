@@ -296,14 +296,17 @@ def reason(rows: pd.DataFrame, problems: int = 0) -> Message:
 
 
 def most_pressing_first(rows: pd.DataFrame) -> pd.DataFrame:
-    """Tracks of the filter that the page speaks of first; of these those that are furthest from consistent,
-    and of alike ones those with the largest error."""
+    """Tracks of the filter that the page speaks of first; of these what is overconfident or `surprised`, then
+    what is further from consistent, and of alike ones the larger error."""
+    if not len(rows):
+        return rows
     what = "nees" if (rows["compared"] > 0).any() else "nis"
     verdict = rows["verdict" if what == "nees" else "nis_verdict"]
+    odd = rows.index.isin(surprised(rows).index)
     order = pd.DataFrame(
         {
-            "other": rows["filter"] != (leading_filter(rows) if len(rows) else ""),
-            "verdict": verdict.map([OVERCONFIDENT, CAUTIOUS, UNKNOWN, CONSISTENT].index),
+            "other": rows["filter"] != leading_filter(rows),
+            "verdict": verdict.map([OVERCONFIDENT, CAUTIOUS, UNKNOWN, CONSISTENT].index).mask(odd, 0),
             "error": -rows["rmse" if what == "nees" else "nis"],
         }
     ).sort_values(["other", "verdict", "error"], kind="stable")
