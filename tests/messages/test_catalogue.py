@@ -87,8 +87,8 @@ def test_no_number_is_shown_with_a_minus_and_nothing(value, kind):
 
 def test_one_and_many():
     nb = load_language("nb")
-    assert say(nb, Message("steps.some", {}, 1)) == "omtrent ett skritt"
-    assert say(nb, Message("steps.some", {}, 4)) == "omtrent 4 skritt"
+    assert say(nb, Message("page.untranslated", {}, 1)).startswith("Én ")
+    assert say(nb, Message("page.untranslated", {}, 4)).startswith("4 ")
     assert say(load_language(), (Message("cause.any"),) * 3).count("something") == 3
 
 
@@ -120,7 +120,7 @@ def test_a_partner_adds_a_language(tmp_path):
         ('[tile]\nnobody = "x"', "tile.nobody", "no text"),
         ('[alarm]\nleans = "It leans."', "alarm.leans", "placeholders"),
         ('[alarm]\njumps = {one = "It jumps.", many = "{n} {size}"}', "alarm.jumps", "placeholders"),
-        ('[steps]\nsome = {one = "x", many = "y"}', "steps.some", "placeholders"),
+        ('[page]\nmore = {one = "x", many = "y"}', "page.more", "placeholders"),
         ('[format]\nmonths = ["x"]', "format.months", "12"),
         ('[tile]\nseen = "' + "x" * 401 + '"', "tile.seen", "401"),
     ],

@@ -175,3 +175,19 @@ def test_signs_of_a_legend_that_lie_on_one_another_or_on_words_are_found():
     assert drawn(12.0) == []
     assert {"the sign of 'a'" in one and "the sign of 'b'" in one for one in drawn(22.0)} == {True}
     assert any(one.startswith("'a' lies on \"the sign of 'a'") for one in drawn(44.0))
+
+
+def test_names_on_a_map_are_apart_and_those_that_lie_beside_others_stay():
+    fig, ax = figures.new_figure(5.6, 5.2)
+    ax.plot([0, 100], [0, 100])
+    for k in range(6):
+        figures.end_label(ax, 50 + 0.2 * k, 50 + 0.1 * k, str(k), "black")
+    figures.end_label(ax, 10, 50, "aside", "black")
+    figures.fit_text(fig)
+    boxes = [name.get_window_extent() for name in ax.texts]
+    for i, one in enumerate(boxes):
+        for other in boxes[:i]:
+            assert min(one.x1, other.x1) <= max(one.x0, other.x0) or (
+                min(one.y1, other.y1) <= max(one.y0, other.y0) + 1
+            )
+    assert ax.texts[-1].xyann == (5, 0)

@@ -6,7 +6,6 @@ from types import MappingProxyType, SimpleNamespace
 
 import numpy as np
 import pandas as pd
-import pytest
 
 from wildlab.reporting import georeferencing
 from wildlab.reporting.georeferencing import truth_errors, worst_sightings
@@ -22,21 +21,16 @@ def test_names_that_may_tell_of_a_place_are_numbered_unless_it_is_open():
     ]
 
 
-def flown(**columns):
-    truth = pd.DataFrame({"target_id": ["m1", "m2", "walker", "walker"],
-                          "time_s": [np.nan, np.nan, 1.0, 2.0], **columns})  # fmt: skip
-    return SimpleNamespace(table=lambda _: truth)
-
-
-def scored(*names):
-    return pd.DataFrame({"truth_id": names})
-
-
 def test_a_truth_s_own_error_is_that_of_what_points_are_compared_with():
-    assert set(truth_errors(flown(), scored("walker", "walker", "m1"))) == {"mark", "track"}
-    assert np.isnan(truth_errors(flown(), scored("m1", "m1", "m2")).pop("mark"))
-    reported = truth_errors(flown(sd_horizontal_m=[0.02, np.nan, 1.4, 1.6]), scored("walker", "m1"))
-    assert reported == {"mark": 0.02, "track": pytest.approx(1.5)}
+    by_target = pd.DataFrame(
+        {"target": ["m1", "m2", "w"], "kind": ["mark", "mark", "track"], "sd": [0.02, np.nan, 1.5]}
+    )
+
+    def errors(*names):
+        return truth_errors(SimpleNamespace(by_target=by_target, best=pd.DataFrame({"truth_id": names})))
+
+    assert errors("w", "w", "m1") == {"mark": 0.02, "track": 1.5}
+    assert np.isnan(errors("m2").pop("mark"))
 
 
 def limits_with(offset=0.0, kind="logged", truth=MappingProxyType({}), certain=False, lost=0):

@@ -27,7 +27,16 @@ from wildlab.reporting import georeferencing as page
 from wildlab.reporting import georeferencing as tables
 from wildlab.reporting.report import open_report
 
-MANY = summarise(np.tile([3.0, 4.0], (50, 1)))
+MEAN = 5.0
+
+
+def accuracy(points=50, lost=0, word="honest", size=(), found=None):
+    """Points that are all 5 m off, and what else a verdict follows from."""
+    summary = summarise(np.tile([3.0, 4.0], (points, 1)))
+    scored = pd.DataFrame({"best_truth": np.ones(points + lost, bool)})
+    return SimpleNamespace(
+        summary=summary, lost=lost, ellipses=ellipses(word, *size), diagnosis=found, scored=scored
+    )
 
 
 def model(causes, without=10.0, with_=10.0, half=0.5, undetermined=None):
@@ -53,7 +62,7 @@ def diagnosis(winner, *others, outliers=(), alike=(), rivals=(), out=0):
     )  # fmt: skip
     names = winner.fit.names
     told = Calibration(names, np.ones(len(names)), 0.01 * np.eye(len(names)), {}, 4, 4, 10)
-    scored = pd.DataFrame({"frame_id": np.arange(20)})
+    scored = pd.DataFrame({"frame_id": np.arange(20), "best_truth": True})
     return Diagnosis(
         scored, np.zeros(20, int), models, ranked, told, alike, outliers, np.arange(20) >= out, (), None
     )
@@ -157,20 +166,21 @@ def test_what_is_not_told_from_zero_is_not_blamed():
 )
 def test_the_colour_of_the_verdict(lost, word, found, level):
     size = (1.3, 1.1, 1.5) if word == "too small" else (1.0, 0.9, 1.1)
-    assert page.verdict_of_accuracy(MANY, lost, ellipses(word, *size), diagnosis(found))[0].colour == level
-    assert page.verdict_of_accuracy(summarise(np.empty((0, 2))), 5, ellipses(word), None)[0].colour == "bad"
+    given = accuracy(50, lost, word, size, diagnosis(found))
+    assert page.verdict_of_accuracy(given)[0].colour == level
+    assert page.verdict_of_accuracy(accuracy(0, 5, word))[0].colour == "bad"
 
 
 def test_logs_that_contradict_each_other_are_a_problem_and_a_warning_is_none():
-    given = (MANY, 0, ellipses("honest"), diagnosis(NOTHING))
-    assert page.verdict_of_accuracy(*given, 0)[0].colour == "good"
-    assert page.verdict_of_accuracy(*given, 1)[0].colour == "bad"
+    given = accuracy(found=diagnosis(NOTHING))
+    assert page.verdict_of_accuracy(given, 0)[0].colour == "good"
+    assert page.verdict_of_accuracy(given, 1)[0].colour == "bad"
 
 
 def test_leaving_out_what_is_far_out_gains_what_the_mean_loses():
     found = diagnosis(model(()), outliers=(FAR,), out=5)
     found.models[0].held = np.where(np.arange(20)[:, None] < 5, [3.0, 4.0], [0.6, 0.8])
-    evidence = page.evidence_of(MANY, 0, ellipses("honest"), found)
+    evidence = page.evidence_of(accuracy(found=found))
     assert evidence.gain == pytest.approx(1 - 1.0 / 2.0) and evidence.troubled == 1
 
 
@@ -205,19 +215,30 @@ def test_the_parts_of_a_flight_come_to_the_same_verdict(gain, half):
     """The overview knows the numbers alone, the report on the georeferencing all of it: one rule for both."""
     found = diagnosis(model(["boresight"], 5.0, 5.0 - gain, half))
     numbers = {("gain", "winner"): {"value": gain, "low": gain - half, "high": gain + half},
-               ("horizontal_error_mean", "logged-pose"): {"value": MANY.mean}}  # fmt: skip
+               ("horizontal_error_mean", "logged-pose"): {"value": MEAN}}  # fmt: skip
     if found.counts:
         numbers["horizontal_error_mean", "calibrated-pose"] = {"value": 5.0 - gain}
-    ours, _ = page.verdict_of_accuracy(MANY, 0, ellipses("honest"), found)
+    ours, _ = page.verdict_of_accuracy(accuracy(found=found))
     worth = sum(one.share >= WORTH for one in gains_of(SimpleNamespace(lost=()), numbers))
     whole = Evidence(gain=WORTH * worth, troubled=int(possible_gain(numbers) is not None), judged=1)
     assert verdict_of(whole) == ours
 
 
 def found_with(points=50, lost=0, winner=NOTHING, **more):
-    summary = summarise(np.tile([3.0, 4.0], (points, 1)))
-    given = {"diagnosis": diagnosis(winner), **more}
-    return SimpleNamespace(summary=summary, lost=lost, scored=range(points + lost), **given)
+    return accuracy(points, lost, found=more.get("diagnosis", diagnosis(winner)))
+
+
+def partly_known():
+    found = accuracy(50, found=diagnosis(NOTHING))
+    found.best = pd.DataFrame({"truth_id": ["m1"]})
+    found.by_target = pd.DataFrame({"target": ["m1", "w"], "kind": ["mark", "track"], "sd": [0.02, 3.0]})
+    found.scored.loc[3, "best_truth"] = False
+    return found
+
+
+def test_the_best_known_truth_is_named_where_points_have_another():
+    said = page.answer(partly_known())[0]
+    assert said.key == "typical-best" and said.values["sd"] == "0.020 m"
 
 
 @pytest.mark.parametrize(
@@ -259,16 +280,16 @@ def test_what_to_do_follows_from_what_was_found(given, options, keys):
 
 
 REASONS = [
-    ((MANY, 0, ellipses("honest"), diagnosis(NOTHING)), "reason-sound"),
-    ((MANY, 0, ellipses("honest"), diagnosis(MOST)), "reason-gain"),
-    ((MANY, 0, ellipses("honest"), diagnosis(UNSURE)), "reason-possible"),
-    ((MANY, 0, ellipses("honest"), diagnosis(NOTHING, outliers=(FAR,))), "reason-outliers"),
-    ((MANY, 0, ellipses("too small", 1.3, 1.1, 1.5), diagnosis(NOTHING)), "reason-ellipses"),
-    ((MANY, 0, ellipses("too large", 0.2, 0.1, 0.4), diagnosis(NOTHING)), "reason-ellipses-long"),
-    ((MANY, 13, ellipses("honest"), diagnosis(NOTHING)), "reason-lost"),
-    ((MANY, 0, ellipses("honest"), diagnosis(NOTHING), 2), "reason-contradictions"),
-    ((summarise(np.ones((3, 2))), 0, ellipses("honest"), diagnosis(NOTHING)), "reason-few"),
-    ((MANY, 0, ellipses("too few"), None), "reason-untried"),
+    ((accuracy(found=diagnosis(NOTHING)),), "reason-sound"),
+    ((accuracy(found=diagnosis(MOST)),), "reason-gain"),
+    ((accuracy(found=diagnosis(UNSURE)),), "reason-possible"),
+    ((accuracy(found=diagnosis(NOTHING, outliers=(FAR,))),), "reason-outliers"),
+    ((accuracy(50, 0, "too small", (1.3, 1.1, 1.5), diagnosis(NOTHING)),), "reason-ellipses"),
+    ((accuracy(50, 0, "too large", (0.2, 0.1, 0.4), diagnosis(NOTHING)),), "reason-ellipses-long"),
+    ((accuracy(50, 13, found=diagnosis(NOTHING)),), "reason-lost"),
+    ((accuracy(found=diagnosis(NOTHING)), 2), "reason-contradictions"),
+    ((accuracy(3, found=diagnosis(NOTHING)),), "reason-few"),
+    ((accuracy(word="too few"),), "reason-untried"),
 ]
 
 
@@ -283,6 +304,7 @@ def test_every_sentence_has_its_words_and_every_word_its_sentence():
     both = model(["boresight", "clock"], with_=2.0), model(["height", "clock"], with_=2.1)
     said += [page.cause_message(diagnosis(*of, rivals=of[1:])) for of in ((MOST, RIVAL), both)]
     said += [one for given in ANSWERS for one in page.answer(found_with(**given))]
+    said += page.answer(partly_known())
     for given, options, _ in ADVICE:
         said += page.advice(found_with(**given), **{"calibrated_elsewhere": False, **options})
     said += [page.verdict_of_accuracy(*given)[1] for given, _ in REASONS]

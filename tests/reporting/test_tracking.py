@@ -191,10 +191,28 @@ def test_all_sensors_together_must_not_be_worse_than_the_best_alone(rmse, level)
     assert ("worse-together" in keys(both)) == (level == "warn")
 
 
+def test_what_contradicts_itself_is_mended_before_tracks_are_believed():
+    assert page.judge_tracks(rows(), [], 1).value == "mend first"
+    assert page.reason(rows(), 1).key == "reason-contradictions"
+
+
+def test_the_track_that_is_worst_stands_first_and_filters_that_do_not_lead_last():
+    a, b, c = (rows(target=name) for name in "abc")
+    b.loc[1, ["verdict", "nees"]] = ["overconfident", 30.0]
+    c.loc[1, "rmse"] = 5.0
+    found = page.most_pressing_first(pd.concat([a, b, c], ignore_index=True))
+    assert list(found["filter"]) == ["schmidt"] * 3 + ["ekf"] * 3
+    assert list(found["target"][:3]) == ["b", "c", "a"]
+    odd = rows(target="a", nis=20.0, nis_verdict="overconfident")
+    found = page.most_pressing_first(pd.concat([c, odd], ignore_index=True))
+    assert list(found["target"][:2]) == ["a", "c"]
+    assert not len(page.most_pressing_first(rows()[:0]))
+
+
 def test_every_sentence_is_one_of_the_catalogue():
     mixed = pd.concat([blind(), blind(target="b", nis_verdict="overconfident", nis=9.0)])
     said = [*page.answer(mixed, []), page.reason(rows()), page.reason(rows(nees_worth=4.0))]
-    said += [page.reason(blind(nis_worth=4.0))]
+    said += [page.reason(blind(nis_worth=4.0)), page.reason(rows(), 1)]
     texts = load_texts("tracking").answers
     assert said[0].key == "innovations-mixed"
     for one in said:

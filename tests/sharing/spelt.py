@@ -22,7 +22,10 @@ NUMBER = 40.8217
 
 def secrets(latitude: float = LATITUDE, longitude: float = LONGITUDE) -> Secrets:
     return Secrets(
-        places=np.array([[latitude, longitude, HEIGHT]]), words=(NAME,), moments=(WHEN,), numbers=(NUMBER,)
+        places=np.array([[latitude, longitude, HEIGHT]]),
+        words={NAME: "flight.toml: name"},
+        moments=(WHEN,),
+        numbers=(NUMBER,),
     )
 
 

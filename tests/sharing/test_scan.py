@@ -37,7 +37,7 @@ def found(text: str, known: Secrets, name: str = "a") -> set[str]:
 
 def placed(latitude: float = LATITUDE, longitude: float = LONGITUDE) -> Secrets:
     """A place, and nothing else."""
-    return replace(secrets(latitude, longitude), moments=(), words=(), numbers=())
+    return replace(secrets(latitude, longitude), moments=(), words={}, numbers=())
 
 
 @pytest.mark.parametrize("spelling", SPELLINGS)
@@ -95,7 +95,7 @@ def test_a_place_on_the_grid_of_what_may_be_told_is_none():
 )  # fmt: skip
 def test_lines_of_a_drawing_are_no_places_and_places_among_them_are(drawn, there):
     """Pixels to a tenth hold no place; what is finer or larger in a drawing may."""
-    known = replace(placed(62.4138, 12.6838), words=("M300",))
+    known = replace(placed(62.4138, 12.6838), words={"M300": "x"})
     text = f"<p>a</p><svg viewBox='0 0 900 600'>{drawn}</svg>"
     assert found(text, known) == ({"place"} if there else set())
 
@@ -122,10 +122,26 @@ def test_the_month_may_be_said():
     ],
 )  # fmt: skip
 def test_names_are_found_and_others_are_not(text):
-    known = Secrets(words=(NAME, "Bjørnøya"))
+    known = Secrets(words={NAME: "x", "Bjørnøya": "x"})
     assert found(f"seen from {text}!", known) == {"name"}
     for other in ("Store Trollhol", "a vessel", "Bjerkøya"):
         assert not found(other, known)
+
+
+def test_a_name_within_a_word_of_ours_is_none_and_one_that_stands_out_says_whose_it_is():
+    known = SecretSearch(Secrets(words={"Mage": "flight.toml: platform.name"}))
+    assert not known.scan({"a": "an image, <td>images</td><td>image</td><td>12</td>"})
+    (finding,) = known.scan({"a": "an image of Mages"})
+    assert finding.word == "'Mage', flight.toml: platform.name" and "Mage" not in repr(finding)
+
+
+def test_a_secret_of_a_flight_is_told_by_its_field():
+    flight = canary(imu=False)
+    treatment = treatment_of(flight.manifest.locations, "public")
+    made, source = generalise(flight, treatment), Source("kifaru-ridge", (), logged=True)
+    words = flight_secrets(flight, made, treatment, source, Path("flights/kifaru-ridge")).words
+    assert words[flight.manifest.name] == "flight.toml: name"
+    assert words["Thandi"] == "a target of the flight's tables"
 
 
 @pytest.mark.parametrize("text", [f"{NUMBER}", f"{NUMBER:.3f} m", f"undulation {NUMBER:.2f}", f"-{NUMBER}"])
@@ -166,6 +182,6 @@ def test_words_of_the_sheets_are_no_names_of_a_flight_and_are_told_to_the_sender
     """A terrain called dem.tif is no secret that "av dem" gives away."""
     sheet = (DATA / "messages" / "edition" / f"{language}.toml").read_text(encoding="utf-8")
     words = ("maps/dem.tif", *re.findall(r"[^\W\d_]{5,}", sheet))
-    assert SecretSearch(Secrets(words=words)).scan({"sheet.html": sheet}) == []
-    assert any("dem" in line for line in search_limits(Secrets(words=("dem",))))
-    assert SecretSearch(Secrets(words=("Skukuza",))).scan({"sheet.html": f"{sheet} Skukuza"})
+    assert SecretSearch(Secrets(words=dict.fromkeys(words, "x"))).scan({"sheet.html": sheet}) == []
+    assert any("dem" in line for line in search_limits(Secrets(words={"dem": "x"})))
+    assert SecretSearch(Secrets(words={"Skukuza": "x"})).scan({"sheet.html": f"{sheet} Skukuza"})

@@ -9,12 +9,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 
 from wildlab.analysis import Fact, fact
-from wildlab.analysis.diagnose import FEWEST_IMAGES, Diagnosis, diagnose
+from wildlab.analysis.diagnose import Diagnosis, diagnose
 from wildlab.analysis.georeference import (
+    FEW_POINTS,
+    FEWEST_IMAGES,
     Observations,
     assumed_deviations,
+    best_known,
     blocks_of,
     calibrated,
     covariances_of,
@@ -25,7 +29,6 @@ from wildlab.analysis.georeference import (
     pose_errors,
     score_points,
 )
-from wildlab.analysis.verdict import FEW_POINTS
 from wildlab.errors import WildlabError
 from wildlab.evaluation.causes import mean_of_others
 from wildlab.evaluation.correlated_errors import WanderNoise
@@ -40,6 +43,7 @@ from wildlab.evaluation.errors import (
     bootstrap_interval,
     summarise,
 )
+from wildlab.evaluation.intervals import block_mean, independent_blocks
 from wildlab.evaluation.outliers import largest_visible
 from wildlab.flight.calibration_files import (
     UNITS,
@@ -59,7 +63,6 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.corrections import Calibration, apply_calibration, calibrated_camera
 from wildlab.geometry.covariances import tilt_and_heading
 from wildlab.geometry.frames import (
-    Array,
     euler_to_matrix,
     matrix_to_euler,
     matrix_to_quaternion,
@@ -78,8 +81,10 @@ class Accuracy:
     observations, points, scored
         What was put on the ground, where, and against the truth: N rows, lost points among them.
     summary, intervals
-        Of the errors as they are, and low and high of its figures by name (these images, resampled); none
-        below six images.
+        Of the errors as they are, of points with the best known truth, and low and high of its figures by
+        name (these images, resampled); none below six images or `FEWEST_INDEPENDENT` independent blocks.
+    by_target
+        A row a target, from `errors_by_target`.
     lost
         How many of the N points have no position.
     assumed
@@ -97,6 +102,7 @@ class Accuracy:
     scored: pd.DataFrame
     summary: ErrorSummary
     intervals: dict[str, tuple[float, float]]
+    by_target: pd.DataFrame
     lost: int
     assumed: dict[str, float]
     ellipses: EllipseVerdict
@@ -104,9 +110,53 @@ class Accuracy:
     visible_m: float
 
     @property
-    def errors(self) -> Array:
-        """(N, 2) m, north-east, as they are; NaN where the point is lost."""
-        return errors_of(self.scored)
+    def best(self) -> pd.DataFrame:
+        """The scored points that are compared with the best known truth."""
+        return best_known(self.scored)
+
+
+#: Of fewer independent blocks than this an interval is a guess.
+FEWEST_INDEPENDENT = 5
+
+
+def errors_by_target(flight: Flight, scored: pd.DataFrame) -> pd.DataFrame:
+    """Errors of the points of each target, the best known truth first.
+
+    Parameters
+    ----------
+    flight
+        With truth.
+    scored
+        From `score_points`, of it.
+
+    Returns
+    -------
+    DataFrame
+        ``target``, ``kind`` (``mark`` or ``track``), ``sd`` (reported of the truth, m, or NaN), ``n``,
+        ``mean`` (m), ``low`` and ``high`` (95 %; NaN of fewer than `FEWEST_INDEPENDENT` independent blocks).
+    """
+    truth, rows = dict(list(flight.table("truth").groupby("target_id"))), []
+    blocks = pd.Series(blocks_of(flight, scored), scored.index)
+    for target, points in scored.dropna(subset=["error_m"]).groupby("truth_id"):
+        kind = "track" if truth[target]["time_s"].notna().any() else "mark"
+        sd = truth[target].get("sd_horizontal_m", pd.Series(dtype=float)).median()
+        error = block_mean(points["error_m"], blocks[points.index], 0.95)
+        known = is_known(points["error_m"], blocks[points.index])
+        low, high = (max(error.low, 0.0), error.high) if known else (np.nan, np.nan)
+        rows.append([target, kind, sd, len(points), error.estimate, low, high])
+    columns = ["target", "kind", "sd", "n", "mean", "low", "high"]
+    return pd.DataFrame(rows, columns=columns).sort_values(["sd", "kind", "n"], ascending=[True, True, False])
+
+
+def is_known(values: ArrayLike, blocks: ArrayLike) -> bool:
+    """Whether values (N,) in blocks (N,) have independent ones enough for an interval.
+
+    Examples
+    --------
+    >>> is_known([1.0, 1.1, 0.9, 1.2, 0.8, 1.0], range(6)), is_known(np.sin(np.arange(20) / 4), range(20))
+    (True, False)
+    """
+    return len(np.unique(blocks)) > 1 and independent_blocks(values, blocks) >= FEWEST_INDEPENDENT
 
 
 def judge_accuracy(
@@ -138,20 +188,20 @@ def judge_accuracy(
     errors_stated = pose_errors(observations, deviations)
     points = georeference(observations, rng, errors_stated)
     scored = score_points(flight, points)
-    errors, blocks = errors_of(scored), blocks_of(flight, scored)
-    summary = summarise(errors)
+    blocks, best = blocks_of(flight, scored), scored["best_truth"].to_numpy()
+    summary = summarise(errors_of(best_known(scored)))
     located = np.isfinite(scored["error_m"]) & np.isfinite(scored["cov_nn"])
     enough = scored.loc[located, "frame_id"].nunique() >= FEWEST_IMAGES
     diagnosis = diagnose(observations, scored) if enough and summary.n >= FEW_POINTS else None
-    intervals = {}
-    if enough:
+    intervals, known = {}, best & scored["error_m"].notna().to_numpy()
+    if enough and is_known(scored.loc[known, "error_m"], blocks[known]):
         figures = {
             "horizontal_error_mean": lambda e: float(np.hypot(*e.T).mean()),
             "horizontal_error_median": lambda e: float(np.median(np.hypot(*e.T))),
             "horizontal_error_p90": lambda e: float(np.quantile(np.hypot(*e.T), 0.9)),
         }
         for name, figure in figures.items():
-            low, high = bootstrap_interval(figure, errors, blocks, rng)
+            low, high = bootstrap_interval(figure, errors_of(scored[known]), blocks[known], rng)
             intervals[name] = max(low, 0.0), high
     by_nearest = flight.manifest.scoring.rule == "nearest"
     return Accuracy(
@@ -160,9 +210,10 @@ def judge_accuracy(
         scored=scored,
         summary=summary,
         intervals=intervals,
+        by_target=errors_by_target(flight, scored),
         lost=int((~np.isfinite(scored["error_m"])).sum()),
         assumed=used_deviations(observations, deviations),
-        ellipses=judge_ellipses(errors, error_covariances(scored), blocks, rng),
+        ellipses=judge_ellipses(errors_of(scored), error_covariances(scored), blocks, rng),
         diagnosis=diagnosis,
         visible_m=visible_error(flight, scored) if by_nearest else np.nan,
     )
@@ -247,7 +298,7 @@ def compare_sightings(points: pd.DataFrame) -> pd.DataFrame:
     DataFrame
         The points that name a thing, with ``truth_id`` (its name), ``error_north_m``, ``error_east_m`` and
         ``error_m``, as from `wildlab.analysis.georeference.score_points`; NaN where no other image shows it.
-        ``truth_sd_m`` is zero: nothing is held against a truth.
+        ``truth_sd_m`` is zero: nothing is held against a truth, and all are alike (``best_truth``).
     """
     named = points[points["target_id"].astype(str) != ""].reset_index(drop=True)
     xy, things = named[["north_m", "east_m"]].to_numpy(float), named["target_id"].to_numpy(str)
@@ -256,7 +307,7 @@ def compare_sightings(points: pd.DataFrame) -> pd.DataFrame:
         own = images == image
         error[own] = (xy - mean_of_others(xy, things, ~own))[own]
     return named.assign(
-        truth_id=things, truth_sd_m=0.0,
+        truth_id=things, truth_sd_m=0.0, best_truth=True,
         error_north_m=error[:, 0], error_east_m=error[:, 1], error_m=np.hypot(*error.T),
     )  # fmt: skip
 

@@ -21,6 +21,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.analysis.georeference import (
+    FEWEST_IMAGES,
     Observations,
     blocks_of,
     error_covariances,
@@ -88,8 +89,6 @@ CAUSES: dict[str, tuple[str, ...]] = {
     "distortion": ("radial",),
 }
 _LENS = ("focal length", "focal lengths", "lens")
-#: Images below which nothing is compared: too few to leave some out.
-FEWEST_IMAGES = 6
 #: Causes of one model at most.
 MOST_CAUSES = 4
 #: Beyond this share of points far out no cause is certain: who is out depends on who is believed.
@@ -117,7 +116,7 @@ class Model:
     held
         (N, 2) m, held-out errors.
     gain
-        Over the poses as logged, of the points that are not far out.
+        Over the poses as logged, of the points with the best known truth that are not far out.
     """
 
     causes: tuple[str, ...]
@@ -251,9 +250,9 @@ class Diagnosis:
         """The winner where it gained something for certain, else the poses as logged."""
         return self.winner if self.counts else self.models[0]
 
-    def held_summary(self, rows: Mask | None = None) -> ErrorSummary:
-        """Held-out errors of what is shown; of rows (N,) or all."""
-        return summarise(self.shown.held if rows is None else self.shown.held[rows])
+    def held_summary(self, rows: Mask | bool = True) -> ErrorSummary:
+        """Held-out errors of what is shown, of points with the best known truth; of rows (N,) or all."""
+        return summarise(self.shown.held[self.scored["best_truth"].to_numpy() & rows])
 
 
 def count_images(scored: pd.DataFrame, rows: Mask) -> int:
@@ -587,9 +586,10 @@ class _Search:
                 fit.deviance,
                 1.0,
                 held,
-                gain_of(without[inliers], held[inliers], self.blocks[inliers]),
+                gain_of(without[judged], held[judged], self.blocks[judged]),
             )
 
+        judged = inliers & self.scored["best_truth"].to_numpy()
         images = count_images(self.scored, used)
         models, wild, alike = search_models(model, self.causes, images)
         tried = len(models) + len(wild)

@@ -5,7 +5,7 @@ surveyed truth.
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -511,8 +511,9 @@ def score_points(flight: Flight, points: pd.DataFrame) -> pd.DataFrame:
     -------
     DataFrame
         The points that can be judged, with ``truth_id``, ``error_north_m``, ``error_east_m``, ``error_m``
-        (NaN where the ray missed the ground), ``truth_sd_m`` (see `truth_deviations`) and ``inside_90``
-        (whether the truth lies in the 90 % ellipse, widened by its own error; NaN where there is no ellipse).
+        (NaN where the ray missed the ground), ``truth_sd_m`` (see `truth_deviations`), ``best_truth`` (see
+        `best_known`) and ``inside_90`` (whether the truth lies in the 90 % ellipse, widened by its own error;
+        NaN where there is no ellipse).
 
     Raises
     ------
@@ -557,7 +558,34 @@ def score_points(flight: Flight, points: pd.DataFrame) -> pd.DataFrame:
     covariance = error_covariances(scored)
     inside = inside_ellipse(error, covariance).astype(float)
     inside[~np.isfinite(covariance).all(axis=(1, 2))] = np.nan
-    return scored.assign(inside_90=inside).reset_index(drop=True)
+    best = _best_truth(scored, set(truth.loc[truth["time_s"].notna(), "target_id"]))
+    return scored.assign(inside_90=inside, best_truth=best).reset_index(drop=True)
+
+
+#: Fewer points than this say little about a flight, and so do fewer images.
+FEW_POINTS, FEWEST_IMAGES = 10, 6
+#: Truths whose standard deviations differ by no more than this are equally well known, m.
+ALIKE_M = 0.5
+
+
+def _best_truth(scored: pd.DataFrame, tracks: Collection[str]) -> Mask:
+    """Which points are compared with the best known truth that enough of them have; all where none has.
+
+    Where nothing is stated, a mark counts as exact and a receiver's track as the least known.
+    """
+    sd, track = scored["truth_sd_m"].to_numpy(float), scored["truth_id"].isin(tracks).to_numpy()
+    sd = np.where(track & (sd == 0), np.inf, sd)
+    for least in np.unique(sd):
+        rows = sd <= least + ALIKE_M
+        located = scored[rows & scored["error_m"].notna().to_numpy()]
+        if len(located) >= FEW_POINTS and located["frame_id"].nunique() >= FEWEST_IMAGES:
+            return np.asarray(rows)
+    return np.ones(len(scored), bool)
+
+
+def best_known(scored: pd.DataFrame) -> pd.DataFrame:
+    """The rows of a scored table that are compared with its best known truth."""
+    return scored[scored["best_truth"]]
 
 
 def error_covariances(scored: pd.DataFrame) -> Array:

@@ -69,12 +69,6 @@ class Coverage(NamedTuple):
         """Of the ground that at least one image shows."""
         return float((self.counts > 0).sum()) * self.step**2
 
-    @property
-    def looks(self) -> float:
-        """Images that show a place, mean over what was seen at all; NaN where nothing was."""
-        seen = self.counts[self.counts > 0]
-        return float(seen.mean()) if len(seen) else float("nan")
-
 
 def ground_height(flight: Flight) -> tuple[float, str] | None:
     """Down coordinate of level ground, and where it is from: the truth, else the detections; None without.
@@ -195,10 +189,6 @@ class Gain(NamedTuple):
         What is gained, metres or how many, and of how many metres, or of how many.
     share
         Of the error or of the data.
-    what
-        What is lost.
-    why
-        What is known of the reason, as a clause; may be empty.
     """
 
     key: str
@@ -206,13 +196,11 @@ class Gain(NamedTuple):
     value: float
     of: float
     share: float
-    what: str = ""
-    why: str = ""
 
 
-def _lost(key: str, count: int, of: int, what: str, why: str = "") -> Gain:
-    """Data that are lost: so many of so many, what they are, and why they are lost."""
-    return Gain(key, (), count, of, count / of if of else 0.0, what, why)
+def _lost(key: str, count: int, of: int) -> Gain:
+    """Data that are lost: so many of so many."""
+    return Gain(key, (), count, of, count / of if of else 0.0)
 
 
 def ordered(table: pd.DataFrame, columns: list[str], stamps: Array | None = None) -> tuple[Array, Array]:
@@ -260,24 +248,21 @@ def lost_data(flight: Flight, source: str | None, streams: dict[str, Pace]) -> l
         with suppress(WildlabError):
             p, angles = frame_poses(flight, source)[0], gimbal_angles(flight)
             posed, turned = np.asarray(np.isfinite(p).all(axis=1)), np.isfinite(np.sum(angles, axis=0))
-        why = _why_unposed(flight, source, ~posed) if flight.timed and (~posed).any() else ""
-        found.append(_lost("images_without_pose", int((~posed).sum()), len(frames), "images", why))
-        missing = int((posed & ~turned).sum())
-        found.append(_lost("images_without_gimbal", missing, len(frames), "images"))
+        found.append(_lost("images_without_pose", int((~posed).sum()), len(frames)))
+        found.append(_lost("images_without_gimbal", int((posed & ~turned).sum()), len(frames)))
         placed, has_pose = _placed(flight, source)
-        away = int((has_pose & ~placed).sum())
-        found.append(_lost("detections_off_ground", away, len(placed), "detections"))
+        found.append(_lost("detections_off_ground", int((has_pose & ~placed).sum()), len(placed)))
     if flight.timed:
         found += _unrecorded(flight, source, streams)
     imu = streams.get("imu")
     if flight.timed and imu is not None and imu.missing:
-        found.append(_lost("inertial_samples", imu.missing, imu.n + imu.missing, "inertial samples"))
+        found.append(_lost("inertial_samples", imu.missing, imu.n + imu.missing))
     found += _untrue(flight)
     return [one for one in found if one.value]
 
 
 def _unrecorded(flight: Flight, source: str | None, streams: dict[str, Pace]) -> list[Gain]:
-    """Seconds of the record without poses, satellite positions or inertial samples, and when these are."""
+    """Seconds of the record without poses, satellite positions or inertial samples."""
     carried = [pace for name, pace in streams.items() if pace.n and name != "truth"]
     if not carried:
         return []
@@ -290,29 +275,9 @@ def _unrecorded(flight: Flight, source: str | None, streams: dict[str, Pace]) ->
         pace = streams.get(name)
         if pace is None or not pace.n or end <= begin:
             continue
-        outside = pace.begin - begin + end - pace.end
-        lost = round(outside + pace.paused_s)
-        said = [
-            *([f"{outside:.0f} before it begins or after it ends"] if round(outside) else []),
-            *([f"{pace.paused_s:.0f} in its pauses"] if round(pace.paused_s) else []),
-        ]
-        what = "seconds of the record"
-        found.append(_lost(key, lost, max(1, round(end - begin)), what, " and ".join(said)))
+        lost = round(pace.begin - begin + end - pace.end + pace.paused_s)
+        found.append(_lost(key, lost, max(1, round(end - begin))))
     return found
-
-
-def _why_unposed(flight: Flight, source: str, unposed: Mask) -> str:
-    nav, times = flight.nav[source], frame_times(flight)[unposed]
-    if "frame_id" in nav:
-        return "no pose bears their name"
-    stamps = nav["time_s"].to_numpy(float)
-    outside = int(((times < np.nanmin(stamps)) | (times > np.nanmax(stamps))).sum())
-    within = int(unposed.sum()) - outside
-    said = [
-        *([f"{outside} before the log of the poses begins or after it ends"] if outside else []),
-        *([f"{within} in its pauses"] if within else []),
-    ]
-    return " and ".join(said)
 
 
 def _untrue(flight: Flight) -> list[Gain]:
@@ -326,7 +291,7 @@ def _untrue(flight: Flight) -> list[Gain]:
     with suppress(WildlabError):  # of a truth whose stamps do not increase nothing is known
         places = truth_of(flight, named.assign(time_s=times))
         missing = int(np.isnan(places[:, 0]).sum())
-        return [_lost("detections_without_truth", missing, len(named), "detections that name a target")]
+        return [_lost("detections_without_truth", missing, len(named))]
     return []
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from enum import StrEnum
 from typing import Any, NamedTuple
 
+from wildlab.analysis.georeference import FEW_POINTS
 from wildlab.analysis.overview import Gain, Overview
 from wildlab.evaluation.ellipses import is_conservative, is_overconfident
 from wildlab.evaluation.intervals import Interval
@@ -15,8 +16,6 @@ from wildlab.evaluation.intervals import Interval
 WORTH = 0.1
 #: Share of points without a position beyond which the others tell nothing.
 MANY_LOST = 0.2
-#: Fewer points than this say little about a flight.
-FEW_POINTS = 10
 
 #: Numbers of reports by name and subject, as ``metrics.json`` has them.
 Numbers = Mapping[tuple[str, str], Mapping[str, Any]]
@@ -260,8 +259,7 @@ def metric_gains(numbers: Numbers) -> Iterable[Gain]:
     if math.isfinite(gain + left):
         yield Gain("cause", causes_told(numbers), gain, gain + left, _share(gain, gain + left))
     if points and points["value"] is not None and math.isfinite(far + kept):
-        why = f"{points['value']:.0f} of {points['n']} points"
-        yield Gain("far_out", (), far, far + kept, _share(far, far + kept), why=why)
+        yield Gain("far_out", (), far, far + kept, _share(far, far + kept))
 
 
 def number_of(numbers: Numbers, name: str, subject: str) -> float:

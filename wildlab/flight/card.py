@@ -123,6 +123,7 @@ class Proposal:
         self.source, self.choices, self.wishes = source, choices, wishes
         self.by_role = {role: [one for one in choices if one.role == role] for role in ROLES}
         self.notes: list[str] = []
+        self.left_out: tuple[str, str] | None = None
         self.logs: dict[str, dict[str, Any]] = {}
         self.data: dict[str, Any] = {"name": wishes.name}
         self.own, camera, receiver, self.triggers = map(self._only, ("own", "camera", "receiver", "triggers"))
@@ -134,10 +135,7 @@ class Proposal:
             self.notes += [said] if said else []
         placed = images is not None and has_place(images.item) and bool(angles(stream_of(images, "photos")))
         if not (self.own or camera or receiver or placed):
-            raise WildlabError(
-                "nothing here says where a camera was",
-                "name its log (--role FILE=own), or write a recipe (data/recipes/README.md)",
-            )
+            raise self._without_poses(images)
         aboard = [(one, part) for one in (self.own, camera) for part in ("poses", "gnss")]
         aboard += [(receiver, "gnss"), (images, "photos")]
         others = [(one, part) for one in self.by_role["target"] for part in ("gnss", "poses")]
@@ -165,11 +163,27 @@ class Proposal:
         self._add_uncertainty()
         self.data["logs"] = self.logs
         if "poses" not in self.data and "gnss" not in self.data:
-            left_out = [one for one in self.notes if one.startswith("The images are left out")]
-            because = f" ({left_out[0]})" if left_out else ""
-            problem = f"nothing here says where a camera was{because}"
-            raise WildlabError(problem, "add its log (--role FILE=own)")
+            raise self._without_poses(images)
         self.data = {key: self.data[key] for key in ORDER if key in self.data} | self.data
+
+    def _without_poses(self, images: Choice | None) -> WildlabError:
+        """What a pose lacks, and what would give it."""
+        if self.left_out is not None:
+            problem, fix = self.left_out
+            return WildlabError(f"the images are left out: {problem}", fix)
+        if images is not None and has_place(images.item):
+            return WildlabError(
+                "the images say where the camera was, nothing says which way it looked (roll, pitch, yaw)",
+                "add the log of the vehicle (--role FILE=own), or a table of angles (data/recipes/README.md)",
+            )
+        return WildlabError(
+            "nothing here says where a camera was",
+            "name its log (--role FILE=own), or write a recipe (data/recipes/README.md)",
+        )
+
+    def _leave_out_images(self, problem: str, fix: str) -> None:
+        self.left_out = problem, fix
+        self.notes.append(f"The images are left out: {problem}. {fix[0].upper()}{fix[1:]}.")
 
     @property
     def recipe(self) -> str:
@@ -316,7 +330,7 @@ class Proposal:
         photos, data, wishes, own = stream_of(images, "photos"), self.data, self.wishes, self.own
         camera, how = camera_of(images.item.log or RawLog({}), wishes.camera, wishes.focal_px)
         if camera is None:
-            self.notes.append(f"The images are left out: {how}. Give --camera or --focal.")
+            self._leave_out_images(how, "give --camera or --focal")
             return
         data["camera"] = camera.model_dump()
         self.notes.append(f"The camera: {how}.")
@@ -329,9 +343,10 @@ class Proposal:
         )
         self.notes.append(clock.note)
         if clock.kind == "sequence" and any(map(self.by_role.get, ("own", "camera", "receiver", "target"))):
-            self.notes.append(
-                "The images are left out: the logs go by time. Import as many images as there are records of "
-                "triggers, or write times into them (exiftool -DateTimeOriginal)."
+            self._leave_out_images(
+                "the logs go by time",
+                "import as many images as there are records of triggers, or write times into them "
+                "(exiftool -DateTimeOriginal)",
             )
             del data["camera"]
             self.logs.pop("triggers", None)

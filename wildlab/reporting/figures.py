@@ -68,6 +68,8 @@ LEAST_TEXT = 11.0
 _EDGE, _UPWARDS = 8.0, 0.6
 #: Letters that a line of a title has at least.
 _FEWEST = 10
+#: How often names that lie on each other are moved: ten in a heap are apart after fewer.
+_ROUNDS = 200
 #: The space between a number and its unit.
 _UNITS = re.compile(r"(?<=\d) (?=[^\W\d]{1,3}(?:/\w+)?\b|[%°])")
 #: What marks a line's name at its end.
@@ -171,15 +173,23 @@ class Powers(LogFormatter):
 
 
 def _apart(names: list[Annotation], points: float) -> None:
-    """Move names up and down until none lies on another, in the order in which their lines end."""
+    """Move names up and down until none lies on another: each of two that do by half of what they overlap."""
     boxes = [name.get_window_extent() for name in names]
-    order = np.argsort([box.y0 + box.y1 for box in boxes], kind="stable")
-    wanted = np.array([(boxes[k].y0 + boxes[k].y1) / 2 for k in order])
-    heights = np.array([boxes[k].height for k in order])
-    below = np.concatenate([[0.0], np.cumsum((heights[:-1] + heights[1:]) / 2)])
-    places = np.maximum.accumulate(wanted - below) + below
-    for k, moved in zip(order, (places - wanted - (places - wanted).mean()) * points, strict=True):
-        names[k].xyann = (names[k].xyann[0], names[k].xyann[1] + float(moved))
+    y, heights = np.array([(b.y0 + b.y1) / 2 for b in boxes]), np.array([b.height for b in boxes])
+    pairs = [
+        (i, k) if (y[i], i) < (y[k], k) else (k, i)
+        for k in range(len(boxes))
+        for i in range(k)
+        if boxes[i].x0 < boxes[k].x1 and boxes[k].x0 < boxes[i].x1
+    ]
+    places = y.copy()
+    for _ in range(_ROUNDS):
+        for below, above in pairs:
+            needed = (heights[below] + heights[above]) / 2 - (places[above] - places[below])
+            if needed > 0:
+                places[[below, above]] += (-needed / 2, needed / 2)
+    for name, moved in zip(names, (places - y) * points, strict=True):
+        name.xyann = (name.xyann[0], name.xyann[1] + float(moved))
 
 
 def _narrow(figure: Figure, legend: Legend) -> None:

@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 from wildlab.analysis import Fact
 from wildlab.analysis.accuracy import Accuracy, Repeats, corrections, on_one_heading
 from wildlab.analysis.diagnose import CAUSES, Diagnosis, nonzero
-from wildlab.analysis.georeference import errors_of
+from wildlab.analysis.georeference import FEW_POINTS, best_known, errors_of
 from wildlab.analysis.verdict import (
-    FEW_POINTS,
     MANY_LOST,
     VERDICT_LEVEL,
     WORTH,
@@ -45,8 +44,6 @@ from wildlab.reporting.figures import colour
 from wildlab.reporting.notebook_pages import ADVICE
 from wildlab.reporting.report import Report, Wording
 
-#: Fewer points than this say little about a flight.
-FEW = FEW_POINTS
 #: From this share of the error on a constant error is most of it.
 MOST = 0.5
 #: Messages of what to do, at most.
@@ -221,7 +218,7 @@ def record_accuracy(
     report: Report, found: Accuracy, answers: Mapping[str, pd.DataFrame]
 ) -> dict[str, ErrorSummary]:
     """Record the metrics of a flight and of other programs' answers; return the summaries of these."""
-    record_errors(report, "logged-pose", found.scored, found.intervals)
+    record_errors(report, "logged-pose", found.best, found.intervals)
     diagnosis = found.diagnosis
     if diagnosis is not None:
         gain, n = diagnosis.winner.gain.gain, int(diagnosis.inliers.sum())
@@ -237,7 +234,7 @@ def record_accuracy(
     others = {}
     for program, table in answers.items():
         subject = "recorded-answers" if len(answers) == 1 else f"recorded-answers/{program}"
-        others[program] = record_errors(report, subject, table)
+        others[program] = record_errors(report, subject, best_known(table))
     return others
 
 
@@ -270,22 +267,23 @@ def named(tables: Mapping[str, pd.DataFrame], kind: str, *, shown: bool) -> dict
 # -- what follows from it
 
 
-def truth_errors(flight: Flight, scored: pd.DataFrame) -> dict[str, float]:
-    """Reported SD (m, or NaN) of the "track" and "mark" that points are compared with, of those there are.
+def truth_errors(found: Accuracy) -> dict[str, float]:
+    """Reported SD (m, or NaN) of the "track" and "mark" among the best known truth, of those there are."""
+    best = found.by_target[found.by_target["target"].isin(found.best["truth_id"])]
+    return {str(kind): float(sd) for kind, sd in best.groupby("kind")["sd"].median().items()}
 
-    Parameters
-    ----------
-    flight
-        With truth.
-    scored
-        From `wildlab.analysis.georeference.score_points`, of it.
-    """
-    truth, used = flight.table("truth"), set(scored["truth_id"].astype(str))
-    moving = set(truth.loc[truth["time_s"].notna(), "target_id"])
-    sd = truth.get("sd_horizontal_m", pd.Series(np.nan, truth.index)).astype(float)
-    kinds = {"track": used & moving, "mark": used - moving}
-    of = {kind: sd[truth["target_id"].isin(which)].dropna() for kind, which in kinds.items() if which}
-    return {kind: float(known.median()) if len(known) else np.nan for kind, known in of.items()}
+
+def targets_table(by_target: pd.DataFrame) -> pd.DataFrame:
+    """A row for each target of which several points are compared; none where that is one target."""
+    rows = by_target[by_target["n"] > 1]
+    if len(rows) < 2:
+        return rows[:0]
+    names = load_texts("georeferencing").subjects
+    ends = [
+        names["too-few"] if math.isnan(low) else f"{low:.2f} to {high:.2f}"
+        for low, high in zip(rows["low"], rows["high"], strict=True)
+    ]
+    return rows.assign(interval=ends, kind=rows["kind"].map(names))
 
 
 def gained_share(gain: Any) -> float:
@@ -348,8 +346,10 @@ def cause_message(diagnosis: Diagnosis | None) -> Message:
 def answer(found: Accuracy) -> list[Message]:
     """How far off positions are, and why: the two sentences that answer the page's question."""
     summary, total = found.summary, len(found.scored)
+    left_out = not found.scored["best_truth"].all()
     values = {
         "points": summary.n,
+        "sd": measure(max(truth_errors(found).values()), "m") if left_out else "",
         "total": total,
         "lost": found.lost,
         "median": length(summary.median),
@@ -359,9 +359,9 @@ def answer(found: Accuracy) -> list[Message]:
         return [Message("no-position", values)]
     if found.lost > MANY_LOST * total:
         return [Message("many-lost", values)]
-    if summary.n < FEW:
+    if summary.n < FEW_POINTS:
         return [Message("few-points", values)]
-    return [Message("typical", values), cause_message(found.diagnosis)]
+    return [Message("typical-best" if left_out else "typical", values), cause_message(found.diagnosis)]
 
 
 def possible_share(logged: ErrorSummary, diagnosis: Diagnosis | None) -> float:
@@ -372,22 +372,9 @@ def possible_share(logged: ErrorSummary, diagnosis: Diagnosis | None) -> float:
     return gain / logged.mean if is_possible(gain, logged.mean, certain=diagnosis.counts) else 0.0
 
 
-def evidence_of(
-    logged: ErrorSummary, lost: int, ellipses: EllipseVerdict, diagnosis: Diagnosis | None, problems: int = 0
-) -> Evidence:
-    """What the verdict on the georeferencing follows from.
-
-    Parameters
-    ----------
-    logged, lost
-        Errors of the points that have a position, and how many have none.
-    ellipses, diagnosis
-        As `wildlab.analysis.accuracy.judge_accuracy` found them; None: nobody could look for a cause.
-    problems
-        How many things in the flight contradict each other.
-    """
-    total = logged.n + lost
-    gains = []
+def evidence_of(found: Accuracy, problems: int = 0) -> Evidence:
+    """What the verdict on the georeferencing follows from; so many things contradict each other."""
+    diagnosis, total, gains = found.diagnosis, len(found.scored), []
     if diagnosis is not None and diagnosis.counts:
         gains.append(gained_share(diagnosis.winner.gain))
     if diagnosis is not None and diagnosis.outliers and diagnosis.inliers.any():
@@ -395,33 +382,31 @@ def evidence_of(
         gains.append((whole - kept) / whole if whole > 0 else np.nan)
     return Evidence(
         problems=problems,
-        lost=lost / total if total else np.nan,
+        lost=found.lost / total if total else np.nan,
         gain=max((gain for gain in gains if gain == gain), default=np.nan),
-        possible=possible_share(logged, diagnosis),
+        possible=possible_share(found.summary, diagnosis),
         troubled=len(diagnosis.outliers) if diagnosis is not None else 0,
-        points=logged.n,
-        excess=(ellipses.factor,),
+        points=found.summary.n,
+        excess=(found.ellipses.factor,),
         judged=int(diagnosis is not None),
     )
 
 
-def verdict_of_accuracy(
-    logged: ErrorSummary, lost: int, ellipses: EllipseVerdict, diagnosis: Diagnosis | None, problems: int = 0
-) -> tuple[Verdict, Message]:
+def verdict_of_accuracy(found: Accuracy, problems: int = 0) -> tuple[Verdict, Message]:
     """What the georeferencing comes to, and the most pressing reason; parameters of `evidence_of`."""
-    evidence = evidence_of(logged, lost, ellipses, diagnosis, problems)
-    verdict, total = verdict_of(evidence), logged.n + lost
+    evidence, diagnosis, ellipses = evidence_of(found, problems), found.diagnosis, found.ellipses
+    verdict, lost, total = verdict_of(evidence), found.lost, len(found.scored)
     gain = gained_share(diagnosis.winner.gain) if diagnosis is not None and diagnosis.counts else 0.0
     times = 1 / ellipses.factor.estimate if ellipses.factor.estimate > 0 else np.nan
     reasons: tuple[tuple[str, bool, dict[str, Any]], ...] = (
         ("reason-contradictions", problems > 0, {"problems": problems}),
-        ("reason-lost", lost > MANY_LOST * total or not logged.n, {"lost": lost, "total": total}),
+        ("reason-lost", lost > MANY_LOST * total or not found.summary.n, {"lost": lost, "total": total}),
         ("reason-gain", gain >= WORTH, {"share": percent_of(gain)}),
         ("reason-outliers", evidence.troubled > 0, {"outliers": evidence.troubled}),
         ("reason-possible", evidence.possible > 0, {"share": percent_of(evidence.possible)}),
         ("reason-ellipses", ellipses.word == "too small", {}),
         ("reason-ellipses-long", is_conservative(ellipses.factor), {"times": significant(times)}),
-        ("reason-few", logged.n < FEW, {"points": logged.n}),
+        ("reason-few", found.summary.n < FEW_POINTS, {"points": found.summary.n}),
         ("reason-untried", diagnosis is None, {}),
         ("reason-sound", True, {}),
     )
@@ -496,24 +481,16 @@ def span(values: Any) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def show_summary(
-    report: Report, wording: Wording, found: Accuracy, problems: int, *, calibrated_elsewhere: bool
-) -> None:
-    """The answer with its verdict, and what to do."""
-    verdict, reason = verdict_of_accuracy(
-        found.summary, found.lost, found.ellipses, found.diagnosis, problems
-    )
-    wording.summary(answer(found), verdict, reason, "georeferencing")
-    show_advice(
-        report, wording.messages(advice(found, calibrated_elsewhere=calibrated_elsewhere, problems=problems))
-    )
-
-
 def show_advice(report: Report, said: Sequence[str]) -> None:
     """What to do, in order; nothing where there is nothing."""
     if said:
         report.section("What to do", part=ADVICE)
         report.points(said, ordered=True)
+
+
+def count_problems(amiss: Sequence[str]) -> int:
+    """How many of what does not fit together are problems."""
+    return sum(one.startswith("problem") for one in amiss)
 
 
 def show_contradictions(report: Report, amiss: Sequence[str]) -> None:
@@ -565,8 +542,10 @@ def show_accuracy(
         record_errors(report, f"logged-pose/{name}", part)
     wording = Wording(report, texts)
     report.head(texts.subjects["question"], _subtitle(flight, found))
-    problems = sum(one.startswith("problem") for one in amiss)
-    show_summary(report, wording, found, problems, calibrated_elsewhere=bool(applied))
+    problems = count_problems(amiss)
+    wording.summary(answer(found), *verdict_of_accuracy(found, problems), "georeferencing")
+    remedies = advice(found, calibrated_elsewhere=bool(applied), problems=problems)
+    show_advice(report, wording.messages(remedies))
     if applied:
         report.text(" ".join(words("georeferencing", applied)))
     show_contradictions(report, amiss)
@@ -578,15 +557,16 @@ def show_accuracy(
         report.tiles(_tiles(found, texts))
         _figures(report, wording, found, programs)
         report.section(texts.subjects["where"])
-        worst = worst_images(found.scored)
-        wording.figure("error-map", error_map(found.scored, list(worst["image"])))
+        worst = worst_images(found.best)
+        wording.figure("error-map", error_map(found.best, list(worst["image"])))
         wording.table("worst", worst)
         if pictures:
-            wording.figure("worst-pictures", sightings_chart(worst_sightings(flight, found.scored), pictures))
+            wording.figure("worst-pictures", sightings_chart(worst_sightings(flight, found.best), pictures))
         rows = {texts.subjects["applied" if applied else "logged"]: logged}
         rows |= _other_summaries(found, texts)
         rows |= {texts.subjects["recorded"].format(program): one for program, one in others.items()}
         wording.table("errors", errors_table(rows))
+        wording.table("targets", targets_table(found.by_target))
         report.published(texts.subjects["published"], texts.subjects, {})
     if diagnosis is not None:
         if corrections is not None and (diagnosis.counts or possible_share(logged, diagnosis)):
@@ -596,8 +576,7 @@ def show_accuracy(
         report.section(
             "Predicted uncertainty", " ".join(wording.messages([_ellipse_message(found.ellipses)]))
         )
-    truth = truth_errors(flight, found.scored)
-    report.limits(wording.messages(limits(flight, found, truth, unlabelled, source)))
+    report.limits(wording.messages(limits(flight, found, truth_errors(found), unlabelled, source)))
     report.section("Details")
     if groups and logged.n:
         wording.table("groups", groups_table(groups))
@@ -639,7 +618,7 @@ def _subtitle(flight: Flight, found: Accuracy) -> str:
 def _tiles(found: Accuracy, texts: PageTexts) -> list[tuple[str, str]]:
     logged, diagnosis, names = found.summary, found.diagnosis, texts.subjects
     interval = found.intervals.get("horizontal_error_mean")
-    again = f" ({length(interval[0])} to {length(interval[1])})" if interval else ""
+    again = f" ({f'{length(interval[0])} to {length(interval[1])}' if interval else names['too-few']})"
     shown = [
         (length(logged.mean), names["tile-mean"] + again),
         (length(logged.p90), names["tile-p90"]),
@@ -680,17 +659,18 @@ def _ellipse_message(verdict: EllipseVerdict) -> Message:
 
 
 def _figures(report: Report, wording: Wording, found: Accuracy, programs: Mapping[str, pd.DataFrame]) -> None:
-    errors, diagnosis, names = found.errors, found.diagnosis, wording.texts.subjects
+    errors, diagnosis, names = errors_of(found.best), found.diagnosis, wording.texts.subjects
     series = {names["logged"]: (errors, colour("logged-pose"))}
     if diagnosis is not None and diagnosis.counts:
-        series[names["corrected"]] = (diagnosis.winner.held, colour("calibrated-pose"))
+        held = diagnosis.winner.held[diagnosis.scored["best_truth"]]
+        series[names["corrected"]] = (held, colour("calibrated-pose"))
     for program, table in programs.items():
-        series[names["recorded"].format(program)] = (errors_of(table), colour("recorded"))
+        series[names["recorded"].format(program)] = (errors_of(best_known(table)), colour("recorded"))
     wording.figure("error-scatter", error_scatter(errors, colour("logged-pose")), main=True)
     report.figures(
         [
             wording.captioned("error-shares", error_shares(series)),
-            wording.captioned("errors-by-image", errors_by_image(found.scored)),
+            wording.captioned("errors-by-image", errors_by_image(found.best)),
         ]
     )
 
@@ -750,7 +730,7 @@ def show_repeats(report: Report, flight: Flight, found: Repeats, amiss: Sequence
     spread, diagnosis, total = found.spread, found.diagnosis, len(found.points)
     images = found.points["frame_id"].nunique()
     report.head(texts.subjects["question"], f"{images} images, {total} points, no truth")
-    word, reason = verdict_of_repeats(found, sum(one.startswith("problem") for one in amiss))
+    word, reason = verdict_of_repeats(found, count_problems(amiss))
     said = wording.messages([answer_repeats(found)])
     cause = Wording(report, load_texts("georeferencing"))
     if diagnosis is not None and spread is not None:

@@ -5,6 +5,7 @@ What is said follows by rules from numbers; the words lie in ``data/messages/en/
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
@@ -36,7 +37,13 @@ from wildlab.messages.catalogue import Message, load_texts
 from wildlab.messages.quantities import metres, number, percent_of
 from wildlab.names import listed
 from wildlab.reporting.charts import flights as charts
-from wildlab.reporting.georeferencing import show_advice, show_contradictions, span, words_of_causes
+from wildlab.reporting.georeferencing import (
+    count_problems,
+    show_advice,
+    show_contradictions,
+    span,
+    words_of_causes,
+)
 from wildlab.reporting.report import Report, Wording
 
 #: Subject of what is recorded of the whole flight.
@@ -89,16 +96,12 @@ def way_of(overview: Overview) -> float:
 
 def gain_message(gain: Gain) -> Message:
     """What fixing one thing gains, and how."""
-    values = {"share": percent_of(gain.share), "why": gain.why}
-    if gain.key == "cause":
-        error, left = metres(gain.of), metres(gain.of - gain.value)
-        causes = words_of_causes(gain.causes) if gain.causes else "–"
-        return Message("gain-cause", {**values, "causes": causes, "error": error, "left": left})
-    if gain.key == "far_out":
-        return Message(
-            "gain-outliers", {**values, "left": metres(gain.of - gain.value), "error": metres(gain.of)}
-        )
-    counts = {"lost": f"{gain.value:.0f}", "of": f"{gain.of:.0f}", "what": gain.what}
+    values = {"share": percent_of(gain.share)}
+    if gain.key in ("cause", "far_out"):
+        values |= {"left": metres(gain.of - gain.value), "error": metres(gain.of)}
+        values |= {"causes": words_of_causes(gain.causes) if gain.causes else "–"}
+        return Message("gain-cause" if gain.key == "cause" else "gain-outliers", values)
+    counts = {"lost": f"{gain.value:.0f}", "of": f"{gain.of:.0f}"}
     return Message(f"gain-{gain.key.replace('_', '-')}", values | counts)
 
 
@@ -120,33 +123,39 @@ def issue_message(issue: Issue, overview: Overview) -> Message:
     """One thing that is wrong along the path, and for how long."""
     instant = issue.seconds < 1 or not overview.length_s > 0
     share = "" if instant else percent_of(min(1.0, issue.seconds / overview.length_s))
-    return Message("issue-instant" if instant else "issue", {"what": issue.what, "share": share})
+    return Message(f"issue{'-instant' if instant else ''}", {"what": issue.what, "share": share})
 
 
-def answer(found: Judged) -> list[Message]:
-    """What happened and what is worth fixing: two sentences at most, the most pressing first."""
-    overview, worth = found.overview, [gain for gain in found.gains if gain.share >= WORTH]
+def pressing(found: Judged) -> list[Message]:
+    """All that asks for something, the most pressing first; each has a remedy."""
+    overview = found.overview
     lasting = [one for one in overview.troubles if one.seconds >= 1]
-    said: list[Message] = [alarm_message(one, overview) for one in overview.alarms]
-    if found.verdict in (Verdict.ALARM, Verdict.MEND) and not said and not found.problems:
-        said.append(Message("part", {"verdict": found.verdict.value}))
+    said = [alarm_message(one, overview) for one in overview.alarms]
     if found.problems:
         said.append(Message("problems", {"problems": found.problems}))
-    said += [gain_message(gain) for gain in (worth or found.gains)[:1]]
-    if lasting:
+    # What is far out may come of what contradicts itself, or of a constant error that is not certain.
+    unsure = found.problems > 0 or found.possible is not None
+    gains = [gain for gain in found.gains if not (unsure and gain.key == "far_out")]
+    said += [gain_message(gain) for gain in sorted(gains, key=lambda gain: -gain.share)]
+    if lasting and found.verdict != Verdict.SOUND:
         said.append(issue_message(max(lasting, key=lambda one: one.seconds), overview))
     if found.possible is not None:
         said.append(Message("possible", {"share": percent_of(found.possible.share)}))
     if found.doubts:
         said.append(Message("doubts", {"reports": listed(list(found.doubts))}))
-    if found.verdict == Verdict.UNJUDGED:
-        return [Message("not-judged"), *said[:1]]
-    known = {"error": metres(found.error)} if np.isfinite(found.error) else None
-    if found.verdict == Verdict.SOUND:
-        return [Message("sound", known) if known else Message("sound-unmeasured"), *said[:1]]
-    if known and len(said) == 1:
-        said.append(Message("error", known))
-    return said[:2] or [Message("look")]
+    return said
+
+
+def answer(found: Judged) -> list[Message]:
+    """What the flight comes to and how far off its positions are; and the most pressing thing."""
+    length = found.overview.length_s
+    values = {
+        "verdict": found.verdict.value.capitalize(),
+        "length": f" of {quantities.duration(length)}" if np.isfinite(length) else "",
+        "error": metres(found.error),
+    }
+    known = "opening" if np.isfinite(found.error) else "opening-unmeasured"
+    return [Message(known, values), *pressing(found)[:1]]
 
 
 def reason(found: Judged, counts: Mapping[str, int]) -> Message:
@@ -169,13 +178,8 @@ def reason(found: Judged, counts: Mapping[str, int]) -> Message:
 
 def advice(found: Judged) -> list[Message]:
     """What to do, the most pressing first, `MOST` at most."""
-    said = [Message("problems-remedy")] if found.problems else []
-    # What is far out may come of what contradicts itself, or of a constant error that is not certain.
-    unsure = found.problems > 0 or found.possible is not None
-    gains = sorted(found.gains, key=lambda gain: gain.key == "far_out")
-    told = (gain_message(gain) for gain in gains if not (unsure and gain.key == "far_out"))
-    said += [Message(f"{one.key}-remedy", one.values) for one in told]
-    return said[:MOST]
+    said = pressing(found)[:MOST]
+    return [Message(f"{re.sub('-(once|instant)$', '', one.key)}-remedy", one.values) for one in said]
 
 
 def limits(overview: Overview, lacking: Sequence[str]) -> list[Message]:
@@ -386,7 +390,7 @@ def show_overview(
     """
     wording = Wording(report, load_texts("overview"))
     amiss = [*(f"problem: {one.sentence} {one.fix}" for one in overview.problems), *amiss]
-    problems = sum(one.startswith("problem") for one in amiss)
+    problems = count_problems(amiss)
     possible = possible_gain(numbers)
     counts = counts_of(overview, gains, problems, judged, possible)
     word = verdict_of(evidence_of(counts, numbers))

@@ -34,14 +34,13 @@ from wildlab.messages.catalogue import Message, load_texts
 from wildlab.messages.quantities import NOTHING, length, significant
 from wildlab.reporting.charts import tracks as charts
 from wildlab.reporting.figures import filter_words
+from wildlab.reporting.georeferencing import count_problems, show_contradictions
 from wildlab.reporting.report import Report, Wording
 
 #: A target tracked by all sensors together may be this many times as far off as by the best one alone.
 ALIKE = 1.2
 #: A mean outside of its band by less than this factor may be so by chance, where few values are independent.
 NEAR_THE_BAND = 1.5
-#: Targets by sensors that are drawn; the table has all.
-MOST_DRAWN = 4
 _RECORDED = (
     # metric, column, unit, low, high, n
     ("rmse", "rmse", "m", None, None, "compared"),
@@ -161,7 +160,7 @@ def worse_together(rows: pd.DataFrame) -> Message | None:
     return Message("worse-together", values)
 
 
-def judge_tracks(rows: pd.DataFrame, pairs: Sequence[SensorPair]) -> Verdict:
+def judge_tracks(rows: pd.DataFrame, pairs: Sequence[SensorPair], problems: int = 0) -> Verdict:
     """What the tracks come to.
 
     Parameters
@@ -170,12 +169,14 @@ def judge_tracks(rows: pd.DataFrame, pairs: Sequence[SensorPair]) -> Verdict:
         From `wildlab.analysis.tracks.tracker.score_tracks`.
     pairs
         From `wildlab.analysis.tracks.tracker.compare_sensors`.
+    problems
+        How many things in the flight contradict each other.
 
     Returns
     -------
     Verdict
     """
-    if not (rows["detections"] > 0).any():
+    if problems or not (rows["detections"] > 0).any():
         return Verdict.MEND
     mine = leading_rows(rows)
     if (rows["compared"] > 0).any():
@@ -273,8 +274,10 @@ def _beside(
     return None
 
 
-def reason(rows: pd.DataFrame) -> Message:
+def reason(rows: pd.DataFrame, problems: int = 0) -> Message:
     """Why the verdict of `judge_tracks` is what it is: what the leading filter's tracks were found to be."""
+    if problems:
+        return Message("reason-contradictions", {"problems": problems})
     if not (rows["detections"] > 0).any():
         return Message("reason-none")
     mine = leading_rows(rows)
@@ -290,6 +293,24 @@ def reason(rows: pd.DataFrame) -> Message:
 
 
 # -- tables
+
+
+def most_pressing_first(rows: pd.DataFrame) -> pd.DataFrame:
+    """Tracks of the filter that the page speaks of first; of these what is overconfident or `surprised`, then
+    what is further from consistent, and of alike ones the larger error."""
+    if not len(rows):
+        return rows
+    what = "nees" if (rows["compared"] > 0).any() else "nis"
+    verdict = rows["verdict" if what == "nees" else "nis_verdict"]
+    odd = rows.index.isin(surprised(rows).index)
+    order = pd.DataFrame(
+        {
+            "other": rows["filter"] != leading_filter(rows),
+            "verdict": verdict.map([OVERCONFIDENT, CAUTIOUS, UNKNOWN, CONSISTENT].index).mask(odd, 0),
+            "error": -rows["rmse" if what == "nees" else "nis"],
+        }
+    ).sort_values(["other", "verdict", "error"], kind="stable")
+    return rows.loc[order.index]
 
 
 def tracks_table(rows: pd.DataFrame) -> pd.DataFrame:
@@ -384,19 +405,6 @@ def plain(text: str) -> str:
 # -- the page
 
 
-def show_answer(
-    report: Report, followed: TrackingResult, rows: pd.DataFrame, pairs: Sequence[SensorPair]
-) -> None:
-    """Title, answer and verdict."""
-    wording = Wording(report, load_texts("tracking"))
-    names, truth = wording.texts.subjects, bool(followed.truth)
-    targets, sensors = rows["target"].nunique(), len(followed.scans)
-    report.head(
-        names["question" if truth else "question-innovations"], f"targets: {targets}, sensors: {sensors}"
-    )
-    wording.summary(answer(rows, pairs), judge_tracks(rows, pairs), reason(rows), "tracking")
-
-
 def show_tracks(
     report: Report,
     flight: Flight,
@@ -405,6 +413,7 @@ def show_tracks(
     pairs: Sequence[SensorPair],
     tuned: Tuned | None = None,
     source: str | None = None,
+    amiss: Sequence[str] = (),
 ) -> None:
     """Write the page.
 
@@ -420,20 +429,26 @@ def show_tracks(
         What another flight taught.
     source
         Name of the poses' ``nav`` table; None for the flight's own.
+    amiss
+        What does not fit together in the flight: `wildlab.flight.checks.check.sense_sentences`.
     """
-    wording = Wording(report, load_texts("tracking"))
+    wording, problems = Wording(report, load_texts("tracking")), count_problems(amiss)
     record(report, rows)
-    show_answer(report, followed, rows, pairs)
+    title = wording.texts.subjects["question" if followed.truth else "question-innovations"]
+    report.head(title, f"targets: {rows['target'].nunique()}, sensors: {len(followed.scans)}")
+    verdict = judge_tracks(rows, pairs, problems)
+    wording.summary(answer(rows, pairs), verdict, reason(rows, problems), "tracking")
+    show_contradictions(report, amiss)
     if followed.notes:
         report.points(followed.notes)
-    # Those that the page speaks of are in sight.
-    leading = rows["filter"] == (leading_filter(rows) if len(rows) else "")
-    wording.table("tracks", tracks_table(pd.concat([rows[leading], rows[~leading]])))
+    wording.table("tracks", tracks_table(most_pressing_first(rows)))
     record_restarts(report, rows)
     _show_figures(report, flight, followed, rows, source)
     limits = ["truth" if followed.truth else "innovations", "same-detections"]
     if any(map(is_at_rest, followed.tracks)):
         limits.append("at-rest")
+    if len(rows[["sensor", "target"]].drop_duplicates()) > 1:
+        limits.append("drawn")
     report.limits(wording.messages(Message(f"limit-{one}") for one in limits))
     report.section("Details")
     wording.table("restarts", restarts_table(rows))
@@ -446,40 +461,32 @@ def show_tracks(
 def _show_figures(
     report: Report, flight: Flight, followed: TrackingResult, rows: pd.DataFrame, source: str | None
 ) -> None:
-    """Maps, and squares, errors and whiteness over time; all but those of the first target are folded."""
-    shown = rows[rows["detections"] > 0]
+    """A map, and squares, errors and whiteness over time, of the most pressing track, of a target that moves
+    if any."""
+    shown = most_pressing_first(rows[rows["detections"] > 0])
     if not len(shown):
         return
-    name = leading_filter(rows)
+    moving = {one.target for one in followed.tracks if not is_at_rest(one)}
+    first = shown.loc[(~shown["target"].isin(moving)).sort_values(kind="stable").index[0]]
+    target, sensor = first["target"], first["sensor"]
     name_of_nav, nav = flight.pose_source(source)
     platforms = {name_of_nav: nav[["north_m", "east_m"]].to_numpy(float)}
-    moving = {one.target for one in followed.tracks if not is_at_rest(one)}
-    shown = shown.sort_values("target", key=lambda names: ~names.isin(moving), kind="stable")
-    maps = []
-    for target in list(dict.fromkeys(shown["target"]))[:MOST_DRAWN]:
-        truth = np.empty((0, 2))
-        if flight.truth is not None:
-            mine = flight.truth["target_id"] == target
-            truth = flight.truth.loc[mine, ["north_m", "east_m"]].to_numpy(float)
-        maps.append(charts.map_shown(followed, target, name, truth, platforms))
-    fig, own, alt, caption = maps[0]
+    truth = np.empty((0, 2))
+    if flight.truth is not None:
+        mine = flight.truth["target_id"] == target
+        truth = flight.truth.loc[mine, ["north_m", "east_m"]].to_numpy(float)
+    fig, own, alt, caption = charts.map_shown(followed, target, leading_filter(rows), truth, platforms)
     report.figure(fig, name=own, alt=alt, caption=caption, main=True)
     report.section("Tracks")
-    if len(maps) > 1:
-        report.figures(maps[1:], fold="Maps of other targets")
-    pairs = list(dict.fromkeys(zip(shown["sensor"], shown["target"], strict=True)))
-    for i, (sensor, target) in enumerate(pairs[:MOST_DRAWN]):
-        tracks = [one for one in followed.tracks if (one.sensor, one.target) == (sensor, target)]
-        figures = [charts.squares_shown(tracks, rows, "nis")]
-        if any(np.isfinite(one.nees).any() for one in tracks):
-            errors = [charts.errors_shown(tracks, rows), charts.squares_shown(tracks, rows, "nees")]
-            figures = [*errors, *figures]
-        if sensor in followed.scans and (
-            white := charts.whiteness_shown(tracks, followed.scans[sensor].elements)
-        ):
-            figures.append(white)
-        if i == 0:
-            report.figures(figures[:2])
-            figures = figures[2:]
-        if figures:
-            report.figures(figures, fold=f"{'More of ' if i == 0 else ''}{target} by {sensor}")
+    tracks = [one for one in followed.tracks if (one.sensor, one.target) == (sensor, target)]
+    figures = [charts.squares_shown(tracks, rows, "nis")]
+    if any(np.isfinite(one.nees).any() for one in tracks):
+        errors = [charts.errors_shown(tracks, rows), charts.squares_shown(tracks, rows, "nees")]
+        figures = [*errors, *figures]
+    if sensor in followed.scans and (
+        white := charts.whiteness_shown(tracks, followed.scans[sensor].elements)
+    ):
+        figures.append(white)
+    report.figures(figures[:2])
+    if figures[2:]:
+        report.figures(figures[2:], fold=f"More of {target} by {sensor}")

@@ -53,6 +53,7 @@ def evaluate_flight(
     notebooks: Path = NOTEBOOKS,
     timeout_s: float | None = None,
     console: Console | None = None,
+    ledger: bool = True,
 ) -> list[Outcome]:
     """Judge a flight folder by all that it has the data for.
 
@@ -69,6 +70,8 @@ def evaluate_flight(
     calibration
         A ``calibration.toml`` of another flight, applied before the georeferencing is judged; left out, the
         one that the flight was imported with, if any.
+    ledger
+        Whether the pages on all reports are written too.
 
     Returns
     -------
@@ -135,7 +138,8 @@ def evaluate_flight(
     about: dict[str, Any] = {"beside": beside, "lacking": reasons, "source": found}
     prepare("-overview", "overview.ipynb", about, source=source)
     passes = [longest_first(jobs[:-1]), jobs[-1:]]
-    outcomes = run_all(passes, skipped, studies, reports, console, parallel=cores())
+    pages = studies if ledger else None
+    outcomes = run_all(passes, skipped, pages, reports, console, parallel=cores())
     order = [jobs[-1].name, *beside]
     return sorted(outcomes, key=lambda one: order.index(one.name) if one.name in order else len(order))
 

@@ -273,7 +273,7 @@ def _notes(chosen: Sequence[StudyEntry], seeds: int | None, scheduler: str | Non
 def run_all(
     passes: Sequence[Sequence[Job]],
     skipped: list[Outcome],
-    studies: dict[str, StudyEntry],
+    studies: dict[str, StudyEntry] | None,
     reports: Path,
     console: Console | None,
     *,
@@ -283,16 +283,21 @@ def run_all(
 ) -> list[Outcome]:
     """Run what was made ready, one pass after the other, and show how it goes; outcomes as of `run_studies`.
 
-    The ledger is written before anything else, from time to time, and at the end, however that comes: it says
-    what is there.
+    The ledger of the studies is written before anything else, from time to time, and at the end, however that
+    comes: it says what is there. Without studies there is none.
     """
+
+    def write() -> float:
+        if studies is not None:
+            build_ledger(reports, studies)
+        return time.monotonic()
+
     if console is not None:
         for note in notes:
             console.print(note, highlight=False, soft_wrap=True)
         for outcome in skipped:
             console.print(outcome_line(outcome), highlight=False, soft_wrap=True)
-    build_ledger(reports, studies)
-    written = time.monotonic()
+    written = write()
     outcomes: dict[str, Outcome] = {}
     try:
         for jobs in filter(None, passes):
@@ -303,15 +308,14 @@ def run_all(
                 def tell(name: str, event: str, what: Any, listen: Listener | None = listen) -> None:
                     nonlocal written
                     if event == "end" and time.monotonic() - written > LEDGER_EVERY_S:
-                        build_ledger(reports, studies)
-                        written = time.monotonic()
+                        written = write()
                     if listen is not None:
                         listen(name, event, what)
 
                 ended = run_jobs(jobs, parallel=parallel, scheduler=scheduler, listen=tell)
             outcomes |= {outcome.name: outcome for outcome in ended}
     finally:
-        build_ledger(reports, studies)
+        write()
     return [*outcomes.values(), *skipped]
 
 

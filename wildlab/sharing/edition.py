@@ -16,6 +16,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from wildlab.analysis.accuracy import observe_calibrated
+from wildlab.analysis.georeference import FEW_POINTS
 from wildlab.analysis.overview import ALARMS, TROUBLES, Alarm, Gain, look_over
 from wildlab.analysis.verdict import (
     MOST,
@@ -46,7 +47,6 @@ from wildlab.messages.catalogue import (
 )
 from wildlab.messages.quantities import nice_length
 from wildlab.reporting.front_page import OwnFlight
-from wildlab.reporting.georeferencing import FEW
 from wildlab.reporting.text import POLICY, mark_up, read_style, render
 from wildlab.reporting.tracking import NEAR_THE_BAND, band_name
 from wildlab.sharing.tiers import Cell
@@ -98,6 +98,8 @@ class Facts(NamedTuple):
         Reports that ask for a closer look themselves: ``georeferencing``, ``tracking``, ``navigation``.
     failed
         Those of `PARTS`, and ``overview``, that failed.
+    far_out, inside
+        Points that are outliers; share of true places in the ellipses that should hold `HELD` of them.
     flown
         Whether it is known that the sensors flew. Else they may be a boat's, or stand somewhere.
     """
@@ -128,6 +130,8 @@ class Facts(NamedTuple):
     pictured: float = NAN
     track_worst: float = NAN
     flown: bool = True
+    far_out: int = 0
+    inside: float = NAN
 
     @property
     def other_sensors(self) -> bool:
@@ -194,6 +198,8 @@ def facts_of(flight: OwnFlight) -> Facts:
         possible=None if possible is None else possible._replace(causes=causes_told(numbers)),
         failed=tuple(about for about in ("overview", *PARTS) if about in failed),
         doubted=doubted(numbers),
+        far_out=int(flight.value("points_far_out", "winner") or 0),
+        inside=value("ellipse_coverage_90", "logged-pose"),
         flown=value("height_above_ground") >= FLYING and value("path_length") >= FLYING,
     )
 
@@ -209,7 +215,7 @@ def _gains(flight: OwnFlight) -> tuple[Gain, ...]:
         if name == "gain_share" and entry["value"] is not None:
             lost = overview.numbers.get(("lost", key), {"value": NAN, "n": NAN})
             gain = metres.get(key, Gain(key, (), float(lost["value"]), float(lost["n"]), 0.0))
-            found.append(gain._replace(share=float(entry["value"]), why=""))
+            found.append(gain._replace(share=float(entry["value"])))
     return tuple(sorted(found, key=lambda one: -one.share))
 
 
@@ -236,8 +242,8 @@ def _median(values: Iterable[float]) -> float:
     return statistics.median(known) if known else NAN
 
 
-#: A step of somebody who walks, m, and beyond how many nobody counts them.
-STEP_M, MOST_STEPS = 0.75, 200
+#: Share of true places that the ellipses should hold, and how much more or less is unlike it.
+HELD, UNLIKE_HELD = 0.9, 0.05
 #: Of two normal errors of equal spread, the median distance from the middle over that spread.
 MEDIAN_DISTANCE = math.sqrt(2 * math.log(2))
 #: Troubles by the gain that is had by doing the same.
@@ -314,28 +320,6 @@ def _cut(items: Sequence[Message]) -> tuple[Message, ...]:
     return tuple(items) if rest <= 0 else (*items[:MOST], Message("page.more", {}, rest))
 
 
-def steps_of(metres: float) -> Message | None:
-    """A length in steps, roughly; None where nobody would count them.
-
-    Parameters
-    ----------
-    metres
-        The length.
-
-    Returns
-    -------
-    Said or None
-        From 20 steps on to the nearest five, from 100 on to the nearest ten.
-    """
-    steps = metres / STEP_M
-    if not steps <= MOST_STEPS:
-        return None
-    if steps < 0.75:
-        return Message("steps.none")
-    to = 1 if steps < 20 else 5 if steps < 100 else 10
-    return Message("steps.some", {}, to * max(1, round(steps / to)))
-
-
 def _applying(*rules: tuple[bool, Message]) -> list[Message]:
     """The messages whose condition holds. One with a number that is not known may be among the rules."""
     return [message for applies, message in rules if applies]
@@ -344,7 +328,7 @@ def _applying(*rules: tuple[bool, Message]) -> list[Message]:
 def _why(facts: Facts) -> Message:
     verdict, share_worth = facts.verdict, {"share": share(WORTH)}
     worth = [gain for gain in facts.gains if gain.share >= WORTH]
-    doubts = [Message(f"why.doubt_{one}") for one in facts.doubted]
+    doubts = [_doubt(facts, one) for one in facts.doubted]
     problems = Message("wrong.problems", {}, facts.problems)
     if verdict in (Verdict.ALARM, Verdict.LOOK) and facts.alarms:
         return _alarm(facts.alarms[0])
@@ -371,6 +355,15 @@ def _why(facts: Facts) -> Message:
     return Message("why.failed" if "overview" in facts.failed else "why.unjudged")
 
 
+def _doubt(facts: Facts, about: str) -> Message:
+    """Why one of `PARTS` asks for a closer look."""
+    if about == "georeferencing" and facts.far_out:
+        return Message("why.doubt_outliers", {"of": number(facts.compared)}, facts.far_out)
+    if about == "georeferencing" and abs(facts.inside - HELD) > UNLIKE_HELD:
+        return Message("why.doubt_ellipses", {"share": share(facts.inside)})
+    return Message(f"why.doubt_{about}")
+
+
 def _next(facts: Facts, advice: Sequence[Message]) -> Message:
     if facts.verdict in (Verdict.ALARM, Verdict.MEND, Verdict.LOOK):
         return Message(f"next.{_key(facts)}")
@@ -384,7 +377,7 @@ def _next(facts: Facts, advice: Sequence[Message]) -> Message:
 
 
 def _tiles(facts: Facts) -> list[tuple[Value, Message]]:
-    known, few = math.isfinite, facts.compared < FEW
+    known, few = math.isfinite, facts.compared < FEW_POINTS
     worst = {"worst": length(facts.track_worst)}
     tracks = Message("tile.tracks", worst) if _unlike(facts) else Message("tile.track")
     pictured = not known(facts.pictured) or facts.pictured == facts.seen
@@ -399,7 +392,7 @@ def _tiles(facts: Facts) -> list[tuple[Value, Message]]:
 
 
 def _measured(facts: Facts) -> list[Message]:
-    known, few, others = math.isfinite, facts.compared < FEW, facts.other_sensors
+    known, few, others = math.isfinite, facts.compared < FEW_POINTS, facts.other_sensors
     named, placed = known(facts.things), not others and facts.seen > 0 and known(facts.placed)
     seen = {"seen": number(facts.seen), "placed": number(facts.placed)}
     off = {"error": length(facts.track_error), "worst": length(facts.track_worst)}
@@ -407,7 +400,6 @@ def _measured(facts: Facts) -> list[Message]:
         "median": length(facts.error_median),
         "p90": length(facts.error_p90),
         "compared": number(facts.compared),
-        "steps": steps_of(facts.error_median) or number(NAN),
     }
     scatter = {
         "apart": length(MEDIAN_DISTANCE * facts.scatter),
@@ -467,7 +459,7 @@ def _wrong(facts: Facts) -> list[Message]:
     found = [_alarm(one) for one in facts.alarms]
     found += _applying(
         (facts.problems > 0, Message("wrong.problems", {}, facts.problems)),
-        ("georeferencing" in facts.doubted, Message("why.doubt_georeferencing")),
+        ("georeferencing" in facts.doubted, _doubt(facts, "georeferencing")),
         (sure, Message("wrong.too_sure")),
         (not sure and "tracking" in facts.doubted, Message("why.doubt_tracking")),
         ("navigation" in facts.doubted, Message("why.doubt_navigation")),
@@ -520,7 +512,7 @@ def _advice(facts: Facts) -> list[Message]:
         found.append(Message("do.possible", {"gain": length(facts.possible.value)}))
     found += _applying(
         (unplaced, Message("do.known_tracks" if others else "do.known_places")),
-        (0 < compared < FEW, Message("do.more_places", {"few": number(FEW)})),
+        (0 < compared < FEW_POINTS, Message("do.more_places", {"few": number(FEW_POINTS)})),
         (bool(facts.failed), Message("do.failed", {}, len(facts.failed))),
     )
     # What a gain asks for already is not asked for twice.
@@ -553,11 +545,11 @@ def _unknown(facts: Facts) -> list[Message]:
         *(Message(f"unknown.failed_{part}") for part in facts.failed),
         *_applying(
             (unplaced, Message("unknown.error_sightings" if facts.tracked else "unknown.error")),
-            (0 < facts.compared < FEW, Message("unknown.few", few, facts.compared)),
+            (0 < facts.compared < FEW_POINTS, Message("unknown.few", few, facts.compared)),
             (not seen, Message("unknown.seen")),
             (seen and not math.isfinite(facts.things), Message("unknown.things")),
             (seen, Message("unknown.hidden_detected" if facts.other_sensors else "unknown.hidden")),
-            (facts.compared >= FEW, Message("unknown.another_day")),
+            (facts.compared >= FEW_POINTS, Message("unknown.another_day")),
         ),
     ]
 
@@ -741,9 +733,6 @@ def edition_html(
         return mark_up(say(words, one))
 
     drawn = picture_html(picture, words)
-    # What a step is taken as stands where steps are.
-    values = [value for one in story.measured for value in one.values.values() if isinstance(value, Message)]
-    steps = any(value.key.startswith("steps.") for value in values)
     return (
         render(
             "edition",
@@ -767,7 +756,6 @@ def edition_html(
                 ("tell", "unknown", story.unknown),
             ],
             place=shown(_place(place, words)),
-            steps=steps,
             untranslated=Message("page.untranslated", {}, len(words.missing)) if words.missing else "",
         )
         + "\n"

@@ -105,7 +105,8 @@ def sources_of(
         if not ours:
             raise WildlabError(
                 f"there is no report on this flight as it is in {reports.resolve()}",
-                f"evaluate it: {typed('wildlab evaluate', path)}",
+                f"evaluate it: {typed('wildlab evaluate', path)}; after evaluate --out FOLDER: "
+                f"{typed('wildlab share FOLDER', flight=path)}",
                 file=path,
             )
         path = ours[0]
@@ -379,6 +380,7 @@ def recompute_reports(
         calibration=applied,
         reports=reports,
         console=console,
+        ledger=False,
     )
     done = {one.name for one in source.folders}
     several = f"{source.name}{MANY}" in done

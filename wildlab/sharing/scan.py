@@ -18,6 +18,7 @@ import unicodedata
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -58,7 +59,7 @@ class Secrets:
     cell_deg
         Places on this grid may be written (0.1: 60.1 N 10.3 E); 0 means that none may.
     words
-        Names, labels, file names, folders, users, hosts, hashes.
+        Names, labels, file names, folders, users, hosts, hashes, with where each stands.
     moments
         UTC, with a zone: when it was, where only the month may be said.
     numbers
@@ -69,20 +70,21 @@ class Secrets:
     places: Array = field(default_factory=lambda: np.empty((0, 3)), repr=False)
     near_m: float = 1000.0
     cell_deg: float = 0.0
-    words: tuple[str, ...] = field(default=(), repr=False)
+    words: Mapping[str, str] = field(default_factory=dict, repr=False)
     moments: tuple[datetime, ...] = field(default=(), repr=False)
     numbers: tuple[float, ...] = field(default=(), repr=False)
 
 
 def machine_secrets() -> Secrets:
     """Who makes the copy, and where on which machine."""
-    words = [str(folder) for folder in (Path.home(), ROOT, Path.cwd(), sys.prefix) if folder is not None]
-    for ask in (getpass.getuser, socket.gethostname):
+    folders = {"home": Path.home(), "wildlab": ROOT, "working": Path.cwd(), "Python's": sys.prefix}
+    words = {str(folder): f"the {what} folder" for what, folder in folders.items()}
+    for what, ask in (("user", getpass.getuser), ("host", socket.gethostname)):
         try:
-            words.append(ask())
+            words[ask()] = f"the {what} of this machine"
         except (OSError, KeyError):
             continue
-    return Secrets(words=tuple(dict.fromkeys(words)))
+    return Secrets(words=words)
 
 
 def flight_secrets(
@@ -111,19 +113,15 @@ def flight_secrets(
     if m.time.epoch is not None and treatment.date == "month":
         first = m.time.epoch.timestamp() + first_stamp(flight)
         moments = [datetime.fromtimestamp(t, UTC) for t in (first, first + _length(flight))]
-    paths = (str(folder.resolve()), *(str(one.resolve()) for one in source.folders))
-    words = (
-        *_known_texts(m.model_dump()),
-        *_known_names(made),
-        *_told(source, made),
-        *paths,
-        *_hashes(source),
-    )
+    words = {str(one.resolve()): "a folder" for one in (folder, *source.folders)}
+    words |= dict.fromkeys(_hashes(source), "a digest")
+    words |= dict.fromkeys(_told(source, made), "the settings of a report")
+    words |= dict(_known_names(made)) | dict(_known_texts(m.model_dump(), "flight.toml"))
     return Secrets(
         places=_known_places(flight),
         near_m=_NEAR,
         cell_deg=treatment.cell_deg or 0.0,
-        words=tuple(dict.fromkeys(words)),
+        words=words,
         moments=tuple(moments),
         numbers=tuple(_known_numbers(m)),
     )
@@ -136,7 +134,7 @@ def all_of(several: Sequence[Secrets]) -> Secrets:
         places=np.concatenate([one.places for one in several]),
         near_m=max((one.near_m for one in with_places), default=_NEAR),
         cell_deg=max((one.cell_deg for one in with_places), default=0.0),
-        words=tuple(dict.fromkeys(word for one in several for word in one.words)),
+        words={word: where for one in several for word, where in one.words.items()},
         moments=tuple(moment for one in several for moment in one.moments),
         numbers=tuple(number for one in several for number in one.numbers),
     )
@@ -180,20 +178,21 @@ def _known_numbers(m: Manifest) -> Iterator[float]:
         yield from (one for one in (m.terrain.added_m, *m.terrain.cell_m) if one and one != m.terrain.step_m)
 
 
-def _known_texts(value: Any) -> Iterator[str]:
-    """All that is stated in words, whatever it is."""
+def _known_texts(value: Any, where: str) -> Iterator[tuple[str, str]]:
+    """All that is stated in words, whatever it is, with its field."""
     if isinstance(value, str):
         # Kinds of hulls of a generalised flight have letters.
-        yield from () if re.fullmatch("kind [A-Z]", value) else (value,)
+        yield from () if re.fullmatch("kind [A-Z]", value) else ((value, where),)
     elif isinstance(value, Mapping | list | tuple):
-        for one in value.values() if isinstance(value, Mapping) else value:
-            yield from _known_texts(one)
+        for key, one in value.items() if isinstance(value, Mapping) else enumerate(value):
+            yield from _known_texts(one, f"{where}: {key}" if ":" not in where else f"{where}.{key}")
 
 
-def _known_names(made: Generalised) -> Iterator[str]:
+def _known_names(made: Generalised) -> Iterator[tuple[str, str]]:
     for kind, known in made.names.by_kind.items():
         # A true name like target-7 is what a neutral one looks like, and says as little.
-        yield from (name for name in _some(known) if not re.fullmatch(rf"{kind}[-_ ]?\d*", name))
+        names = (name for name in _some(known) if not re.fullmatch(rf"{kind}[-_ ]?\d*", name))
+        yield from ((name, f"a {kind} of the flight's tables") for name in names)
 
 
 def _told(source: Source, made: Generalised) -> Iterator[str]:
@@ -272,13 +271,15 @@ class Finding:
         Its name.
     kind
         ``"place"``, ``"date"``, ``"name"`` or ``"number"``.
-    found
-        The text itself, shortened: for the sender's eyes, so it is not shown when printed.
+    found, word
+        The text itself, shortened, and of a name which one it is and where that stands: for the sender's
+        eyes, so it is not shown when printed.
     """
 
     file: str
     kind: str
     found: str = field(repr=False)
+    word: str = field(default="", repr=False)
 
     def __str__(self) -> str:
         return f"{self.file}: {self.kind}"
@@ -295,9 +296,11 @@ class SecretSearch:
     """
 
     def __init__(self, secrets: Secrets) -> None:
-        self.phrases = list(dict.fromkeys(
-            spelt for phrase in phrases_of(secrets.words)[0] for spelt in (phrase, tuple(map(_bare, phrase)))
-        ))  # fmt: skip
+        self.phrases = {
+            spelt: f"{word!r}, {secrets.words[word]}"
+            for phrase, word in phrases_of(secrets.words)[0].items()
+            for spelt in (phrase, tuple(map(_bare, phrase)))
+        }
         self.near_m, self.cell_deg = secrets.near_m, secrets.cell_deg
         self.places = list(_axes(secrets.places)) if len(secrets.places) else []
         self.dates = _date_pattern(secrets.moments)
@@ -306,36 +309,40 @@ class SecretSearch:
     def scan(self, files: Mapping[str, str]) -> list[Finding]:
         """Find what must not be in texts, by the names under which they are sent, or in these names."""
         return [
-            Finding(where, kind, excerpt)
+            Finding(where, *found)
             for name, content in files.items()
             for where, text in ((f"the name of the file {name}", name), (name, content))
-            for kind, excerpt in dict.fromkeys(self._found_in(text))
+            for found in dict.fromkeys(self._found_in(text))
         ]
 
-    def _found_in(self, text: str) -> Iterator[tuple[str, str]]:
-        """Kind and excerpt of all that is found, in all readings of a text."""
+    def _found_in(self, text: str) -> Iterator[tuple[str, str, str]]:
+        """Kind, excerpt and name of all that is found, in all readings of a text."""
         for reading in map(_same_signs, readings(text)):
-            found = [("name", *span) for span in self._names(reading)]
-            found += [("date", *match.span()) for match in self.dates.finditer(reading)]
+            found = [("name", *one) for one in self._names(reading)]
+            found += [("date", *match.span(), "") for match in self.dates.finditer(reading)]
             numbers = _decimals(reading)
-            found += [("number", *span) for span in _scalars(reading, numbers, self.numbers)]
-            found += [("place", *span) for span in self._places(reading, numbers)]
-            for kind, start, end in found:
+            found += [("number", *span, "") for span in _scalars(reading, numbers, self.numbers)]
+            found += [("place", *span, "") for span in self._places(reading, numbers)]
+            for kind, start, end, word in found:
                 piece = reading[max(start - 12, 0) : min(end, start + 120) + 12]
-                yield kind, re.sub(r"\s+", " ", piece)
+                yield kind, re.sub(r"\s+", " ", piece), word
 
-    def _names(self, text: str) -> Iterator[tuple[int, int]]:
+    def _names(self, text: str) -> Iterator[tuple[int, int, str]]:
         small = text.casefold()
         for spelt in dict.fromkeys((small, _bare(small))):
             # Most words are ruled out at once by the different words of the text.
             haystack = "\n".join(set(_PARTS.findall(spelt)))
-            for phrase in self.phrases:
+            for phrase, word in self.phrases.items():
                 if all(part in haystack for part in phrase):
                     body = r"[\W_]{0,3}".join(re.escape(part) for part in phrase)
                     short = len("".join(phrase)) < LONG
-                    match = re.search(rf"(?<![^\W_]){body}(?![^\W_])" if short else body, spelt)
-                    if match:
-                        yield match.span()
+                    matches = re.finditer(rf"(?<![^\W_]){body}(?![^\W_])" if short else body, spelt)
+                    # A name of one word within a longer word of ours, as "Mage" in "image", is none.
+                    around = _longer_words(phrase[0]) if len(phrase) == 1 else ()
+                    for match in matches:
+                        if not any(spelt.startswith(one, max(match.start() - at, 0)) for one, at in around):
+                            yield *match.span(), word
+                            break
 
     def _places(self, text: str, numbers: Array) -> Iterator[tuple[int, int]]:
         """Two numbers that belong to the same place and stand close together, or one that is fine enough."""
@@ -402,15 +409,23 @@ def parts_of(word: str) -> tuple[str, ...]:
     return tuple(_PARTS.findall(unicodedata.normalize("NFKC", word).casefold()))
 
 
-def phrases_of(words: Iterable[str]) -> tuple[list[tuple[str, ...]], list[str]]:
-    """What can be looked for of names, in parts; and the names of which nothing can.
+@cache
+def _longer_words(part: str) -> tuple[tuple[str, int], ...]:
+    """Words of reports and of the sheets that a name is a part of, and where in them it begins."""
+    words = own_vocabulary() | sheet_words()
+    spelt = words | set(map(_bare, words))
+    return tuple((word, word.index(part)) for word in sorted(spelt) if part in word)
+
+
+def phrases_of(words: Iterable[str]) -> tuple[dict[tuple[str, ...], str], list[str]]:
+    """What can be looked for of names, in parts, with the name; and the names of which nothing can.
 
     Parameters
     ----------
     words
         As they are: paths are taken apart, and so are names with blanks, - and _.
     """
-    wanted: dict[tuple[str, ...], None] = {}
+    wanted: dict[tuple[str, ...], str] = {}
     skipped: dict[str, None] = {}
     for word in dict.fromkeys(words):
         for piece in (piece for piece in re.split(r"[/\\]", word) if piece.strip()):
@@ -418,12 +433,12 @@ def phrases_of(words: Iterable[str]) -> tuple[list[tuple[str, ...]], list[str]]:
             for one in dict.fromkeys((piece, stem)):
                 phrase = parts_of(one)
                 if _can_be_sought(phrase):
-                    wanted[phrase] = None
+                    wanted[phrase] = word
                 elif one == piece and phrase:
                     skipped[one] = None
             telling = [part for part in parts_of(stem) if len(part) >= LONG and not part.isdigit()]
-            wanted.update({(part,): None for part in telling if part not in own_vocabulary() | sheet_words()})
-    return list(wanted), list(skipped)
+            wanted.update({(part,): word for part in telling if part not in own_vocabulary() | sheet_words()})
+    return wanted, list(skipped)
 
 
 def _can_be_sought(phrase: tuple[str, ...]) -> bool:

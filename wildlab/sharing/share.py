@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
-import glob
 import io
 import os
-import re
 import shutil
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -335,14 +332,14 @@ def _refuse_leaks(pages: Mapping[str, str], target: Path, sought: SecretSearch) 
     found = sought.scan(pages)
     if not found:
         return
-    several = "; ".join(f"{one} ({one.found!r})" for one in found[:_MOST])
+    several = "; ".join(f"{one} {one.word and f'({one.word})'} in {one.found!r}" for one in found[:_MOST])
     more = f"; and {len(found) - _MOST} more" if len(found) > _MOST else ""
     named = all(one.file.startswith("the name of the file") for one in found)
     raise RunFailed(
         f"there is no copy: this was found in it: {several}{more}",
         "give the copy another name: --out FILE"
         if named
-        else "rename it in the flight, evaluate and share again; report a place or date",
+        else "rename it there, evaluate and share again; report a place or date",
         file=target,
         field="--out" if named else "",
     )
@@ -388,8 +385,6 @@ SHORTEST = 12
 
 #: How the name of a `private_folder` begins, and the file in it that says it is one.
 _PREFIX, _MARK = "wildlab-share-", ".wildlab-private"
-#: How the name of a file ends that is written and not finished, see `wildlab.files.write_atomic`.
-_PART = re.compile(r"\.[a-z0-9_]{8}")
 #: Waits until the process that started it is gone, however it ended, and removes a folder until it stays
 #: away: what that process had started may still write into it.
 _WATCH = """
@@ -495,13 +490,8 @@ def zip_bytes(files: Mapping[str, bytes], password: str | None = None) -> bytes:
     return whole.getvalue()
 
 
-#: Nobody writes longer than that on a copy (s).
-LEFT_S = 3600.0
-
-
 def put(content: bytes, target: Path, overwrite: bool, mode: int = 0o644) -> None:
-    """Write a finished file, whole or not at all; half of one that a machine left when it stopped goes, after
-    an hour: before, another copy may be writing it.
+    """Write a finished file, whole or not at all.
 
     Raises
     ------
@@ -510,9 +500,4 @@ def put(content: bytes, target: Path, overwrite: bool, mode: int = 0o644) -> Non
     """
     refuse_existing(target, overwrite)
     target.parent.mkdir(parents=True, exist_ok=True)
-    for part in target.parent.glob(f".{glob.escape(target.name)}.????????"):
-        with contextlib.suppress(FileNotFoundError):
-            left = time.time() - part.lstat().st_mtime > LEFT_S
-            if left and _PART.fullmatch(part.suffix) and part.is_file() and not part.is_symlink():
-                part.unlink()
     write_atomic(target, content, mode)

@@ -1,6 +1,7 @@
 """A card in, a flight out: what is seen where it truly is, by an independent projection."""
 
 import json
+import re
 import tomllib
 from datetime import UTC, datetime
 from pathlib import Path
@@ -222,3 +223,17 @@ def test_of_two_cameras_the_thermal_one_is_taken_and_the_other_can_be(card, tmp_
     assert len(flight.table("frames")) == 3
     wide = import_card(read(card, {"DCIM/100MEDIA": "images:wide"}), tmp_path / "wide")
     assert len(wide.table("frames")) == 4
+
+
+@pytest.mark.parametrize(("lacking", "remedy"), [("Gimbal", "--role"), ("CalibratedFocalLength", "--camera")])
+def test_what_images_lack_is_what_is_asked_for(lacking, remedy, card):
+    """Places without angles want a log; angles without a focal length want a camera."""
+    for path in card.rglob("*.JPG"):
+        content = path.read_bytes()
+        for found in re.findall(rb'drone-dji:\w*="[^"]*"', content):
+            if lacking.encode() in found:
+                content = content.replace(found, b" " * len(found))
+        path.write_bytes(content)
+    with pytest.raises(WildlabError) as refused:
+        read(card)
+    assert remedy in refused.value.fix

@@ -12,7 +12,7 @@ from tests.sharing.edition.flights import EMPTY, NAN, WHOLE
 from wildlab.analysis.overview import ALARMS, Alarm
 from wildlab.analysis.verdict import CAUSES, PARTS, Gain, Verdict
 from wildlab.messages.catalogue import Message, languages, length, load_language, say
-from wildlab.sharing.edition import _TROUBLES, STEP_M, Facts, Story, steps_of, tell
+from wildlab.sharing.edition import _TROUBLES, Facts, Story, tell
 
 LANGUAGES = [load_language(code) for code in languages()]
 RADAR = EMPTY._replace(
@@ -104,16 +104,20 @@ def test_only_what_was_judged_is_called_reliable(verdict, trusted):
     assert not tell(told._replace(doubted=("tracking",))).trusted
 
 
-@given(st.floats(0.0, 400.0))
-def test_steps_are_near_the_length(metres):
-    said = steps_of(metres)
-    if said is None:
-        assert metres > 200 * STEP_M
-    elif said.key == "steps.none":
-        assert metres < STEP_M
-    else:
-        assert said.n is not None
-        assert abs(said.n * STEP_M - metres) <= max(0.5 * STEP_M, 0.13 * metres) + 1e-9
+@pytest.mark.parametrize(
+    ("changes", "key"),
+    [
+        ({"far_out": 3, "inside": 0.5}, "why.doubt_outliers"),
+        ({"inside": 0.7}, "why.doubt_ellipses"),
+        ({"inside": 0.88}, "why.doubt_georeferencing"),
+    ],
+)
+def test_a_doubt_has_its_reason(changes, key):
+    """Whoever gets the sheet has no report to look at."""
+    told = WHOLE._replace(
+        verdict="look closer", gains=(), troubles=(), doubted=("georeferencing",), **changes
+    )
+    assert tell(told).why.key == key and key in keys(tell(told).wrong)
 
 
 def said_of(story: Story) -> list[Any]:

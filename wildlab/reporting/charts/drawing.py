@@ -25,6 +25,7 @@ from wildlab.geometry.georeference import Terrain
 from wildlab.names import figure_name
 from wildlab.reporting.figures import (
     BLUE,
+    END_LABEL,
     GREEN,
     GREY,
     INK,
@@ -168,6 +169,7 @@ def mark_place(ax: Axes, place: ArrayLike, name: str, *, below: bool, aside: flo
     ax.annotate(
         name, (east, north), (aside, -7 if below else 7), textcoords="offset points",
         ha="left" if aside else "center", va="top" if below else "bottom", fontsize=10, bbox=_BOX,
+        gid=END_LABEL,
     )  # fmt: skip
 
 
