@@ -24,8 +24,8 @@ from wildlab.geometry.camera import Camera, distort, normalise
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.compilation import compiled
 from wildlab.geometry.frames import Array, wrap
-from wildlab.geometry.georeference import Terrain, _to_grid, intersect_terrain, pixel_rays
-from wildlab.geometry.rays import HIT
+from wildlab.geometry.georeference import Terrain, intersect_terrain, pixel_rays
+from wildlab.geometry.rays import HIT, MISSED
 
 #: A line of sight ends this share of its length before the point: the point lies on the ground itself.
 SHORT_OF = 1e-7
@@ -50,11 +50,6 @@ def lines_clear(terrain: Terrain, points: ArrayLike, p_nc: ArrayLike) -> NDArray
     (N,) bool. False too where the line leads through what the map does not know, below its highest height,
     where the camera is below the ground, and for what is NaN.
 
-    Raises
-    ------
-    WildlabError
-        Where there are neither as many cameras as points, nor one.
-
     Examples
     --------
     A wall of 10 m between a camera and a point; a second point is higher.
@@ -67,20 +62,8 @@ def lines_clear(terrain: Terrain, points: ArrayLike, p_nc: ArrayLike) -> NDArray
     [False  True]
     """
     targets, starts = (np.atleast_2d(np.asarray(each, float)) for each in (points, p_nc))
-    if targets.shape[-1] != 3 or starts.shape[-1] != 3 or len(starts) not in (1, len(targets)):
-        raise WildlabError(
-            f"cameras of the shape {starts.shape} for points of the shape {targets.shape}",
-            "give one camera for each point, or one for all, three columns each",
-            field="p_nc",
-        )
-    # Compiled functions are imported where they are called: a compiler takes its time to be imported.
-    from wildlab.geometry.compilation import announced
-    from wildlab.geometry.kernels import clear_all
-
-    blocks, shapes = terrain._blocks
-    lenses, ends = (_to_grid(terrain, each, whole=True) for each in (starts, targets))
-    with announced("lines of sight"):
-        return np.asarray(clear_all(terrain.height, blocks, shapes, lenses, ends, SHORT_OF, terrain._top))
+    met = intersect_terrain(terrain, targets - starts, starts, 1 - SHORT_OF)
+    return np.asarray(met.became == MISSED)
 
 
 def widest_view(camera: Camera) -> float:
