@@ -17,16 +17,14 @@ from benchmarks import (
     navigation,
     particles,
     pixel_to_plane,
-    simulation,
     terrain,
     tracking,
-    turns,
     warm,
 )
 
 BASELINE = Path(__file__).with_name("baseline.json")
 EVERY = (
-    *(pixel_to_plane, turns, terrain, navigation, tracking, many, particles, simulation, warm, floating),
+    *(pixel_to_plane, terrain, navigation, tracking, many, particles, warm, floating),
     long_flight,
 )
 

@@ -464,13 +464,11 @@ def _to_grid(terrain: Terrain, vectors: Array, *, whole: bool) -> Array:
 
 def _pyramid(height: NDArray[np.float32], top: float) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
     """Highest nodes of blocks of 4, 8, 16, ... cells a side, one after the other, and each level's shape."""
-    from wildlab.geometry.compilation import announced
-    from wildlab.geometry.kernels import FIRST, highest_of_blocks, highest_of_four
+    from wildlab.geometry.kernels import FIRST, highest, highest_of_blocks
 
-    with announced("the walk over terrain"):
-        levels = [highest_of_blocks(height, 1 << FIRST, top)]
-        while max(levels[-1].shape) > 1:
-            levels.append(highest_of_four(levels[-1]))
+    levels = [highest_of_blocks(height, 1 << FIRST, top)]
+    while max(levels[-1].shape) > 1:
+        levels.append(highest(levels[-1]))
     shapes = np.array([one.shape for one in levels], np.int64)
     begins = np.concatenate([[0], np.cumsum(shapes.prod(axis=1))[:-1]])
     return np.concatenate([one.ravel() for one in levels]), np.column_stack([shapes, begins])

@@ -14,8 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wildlab.geometry.frames import USUAL_GRAVITY, Array, euler_to_matrix
-from wildlab.simulation import kernels
+from wildlab.geometry.frames import USUAL_GRAVITY, Array, euler_to_matrix, matrix_to_rotation_vector
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.parameters import TwinParameters
 
@@ -32,17 +31,18 @@ class Disturbance:
 
     def __call__(self, times: ArrayLike) -> Array:
         """The signal. (N,) s -> (N,)."""
-        return np.asarray(self._summed(times, 1)[0])
+        return np.asarray(np.sin(self._angles(times)) @ self.amplitudes)
 
     def with_derivatives(self, times: ArrayLike) -> Array:
         """The signal and its first two derivatives with respect to time. (N,) s -> (3, N)."""
-        return self._summed(times, 3)
+        angles, slopes = self._angles(times), self.amplitudes * self.frequencies
+        sines = np.sin(angles)
+        return np.stack(
+            [sines @ self.amplitudes, np.cos(angles) @ slopes, -sines @ (slopes * self.frequencies)]
+        )
 
-    def _summed(self, times: ArrayLike, rows: int) -> Array:
-        t = np.ascontiguousarray(times, float)
-        out = np.empty((rows, len(t)))
-        kernels.sum_of_sines(t, self.amplitudes, self.frequencies, self.phases, out)
-        return out
+    def _angles(self, times: ArrayLike) -> Array:
+        return np.multiply.outer(np.asarray(times, float), self.frequencies) + self.phases
 
 
 def no_disturbance() -> Disturbance:
@@ -103,10 +103,14 @@ def coordinated_attitude(
     -------
     ``R_nb`` (N, 3, 3).
     """
-    v, a = (np.ascontiguousarray(part, float) for part in (velocity, acceleration))
-    R = np.empty((len(v), 3, 3))
-    kernels.coordinated_attitude(v, a, np.array(wind, float), float(trim_pitch), float(gravity), R)
-    return R
+    x = _unit(np.asarray(velocity, float) - wind)
+    y = _unit(np.cross(x, acceleration - np.array([0.0, 0.0, gravity])))
+    return np.asarray(np.stack([x, y, np.cross(x, y)], axis=-1) @ euler_to_matrix(0.0, trim_pitch, 0.0))
+
+
+def _unit(vectors: Array) -> Array:
+    """(N, 3), each of length one."""
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
 
 
 def fixed_wing_trajectory(
@@ -178,12 +182,10 @@ def thrust_aligned_trajectory(
     def motion(times: Array) -> Motion:
         t = np.asarray(times, float)
         p, v, a = path(t)
-        z = np.array([0.0, 0.0, 1.0]) - a / gravity
-        z /= np.linalg.norm(z, axis=-1, keepdims=True)
+        z = _unit(np.array([0.0, 0.0, 1.0]) - a / gravity)
         nose = heading(t)
         ahead = np.stack([np.cos(nose), np.sin(nose), np.zeros(len(t))], axis=-1)
-        y = np.cross(z, ahead)
-        y /= np.linalg.norm(y, axis=-1, keepdims=True)
+        y = _unit(np.cross(z, ahead))
         R = np.stack([np.cross(y, z), y, z], axis=-1) @ euler_to_matrix(0.0, trim_pitch, 0.0)
         calm = Motion(t, p, v, a, R)
         return calm if gusts is None else turned(calm, gusts)
@@ -288,10 +290,7 @@ def camera_motion(twin: TwinParameters, trajectory: Trajectory, times: Array, se
     sway = camera_sway(twin, trajectory, seed)
     if sway is None:
         return motion
-    roll, pitch, yaw = (np.ascontiguousarray(angle) for angle in sway(times).T)
-    R = np.empty_like(motion.R_nb)
-    kernels.turn(np.ascontiguousarray(motion.R_nb), roll, pitch, yaw, R)
-    return replace(motion, R_nb=R)
+    return replace(motion, R_nb=motion.R_nb @ euler_to_matrix(*sway(times).T))
 
 
 #: Times (N,) in s -> position, velocity, acceleration in n, (N, 3) each, in m, m/s, m/s^2.
@@ -327,10 +326,8 @@ Trajectory = Callable[[Array], Motion]
 
 def turned(motion: Motion, disturbance: AttitudeDisturbance) -> Motion:
     """The motion of a body in the same place, turned about the axes of the first one by small angles."""
-    R = np.empty_like(motion.R_nb)
     roll, pitch, yaw = (angle(motion.times) for angle in disturbance)
-    kernels.turn(np.ascontiguousarray(motion.R_nb), roll, pitch, yaw, R)
-    return replace(motion, R_nb=R)
+    return replace(motion, R_nb=motion.R_nb @ euler_to_matrix(roll, pitch, yaw))
 
 
 def attitude_along(trajectory: Trajectory) -> Signal:
@@ -368,10 +365,16 @@ def angular_rates(attitude: Signal, times: ArrayLike, step: float = 0.01) -> Arr
     (N, 3) rad/s, in b.
     """
     t = np.asarray(times, float)
-    rates = np.empty((len(t), 3))
-    R = [np.ascontiguousarray(attitude(t + steps * step)) for steps in (-2, -1, 1, 2)]
-    kernels.body_rates(R[0], R[1], R[2], R[3], step, rates)
-    return rates
+    return rates_between(*(attitude(t + steps * step) for steps in (-2, -1, 1, 2)), step=step)
+
+
+def rates_between(far_before: Array, before: Array, after: Array, far_after: Array, *, step: float) -> Array:
+    """Angular rate in b, (N, 3), half-way between attitudes a ``step`` (s) and two away, to fourth order."""
+    near, far = (
+        matrix_to_rotation_vector(np.swapaxes(first, -1, -2) @ last)
+        for first, last in ((before, after), (far_before, far_after))
+    )
+    return np.asarray((4 * near / (2 * step) - far / (4 * step)) / 3)
 
 
 def specific_forces(motion: Motion, gravity: float = USUAL_GRAVITY) -> Array:
