@@ -124,10 +124,11 @@ class Navigation(NamedTuple):
 
 
 class MekfInputs(NamedTuple):
-    """What both the compiled filter and its reference take.
+    """What the compiled filter takes.
 
     ``state`` (n + 1,) and ``covariance`` (n, n) are those of the start, with the errors beyond the fifteen;
-    ``extra`` (n - 15, 2) is the density and the time of these, ``axes`` whether the axes' are among them.
+    ``slow`` (n - 9, 2) is the density and the time of biases and these, ``axes`` whether the axes' are among
+    them.
     """
 
     line: Timeline
@@ -139,7 +140,7 @@ class MekfInputs(NamedTuple):
     state: Array
     covariance: Array
     axes: bool
-    extra: Array
+    slow: Array
     gate: float
 
 
@@ -165,9 +166,10 @@ def prepare(
         sd if np.isinf(time) else sd * np.sqrt(2 / time)  # spectral density from the standard deviation
         for sd, time in ((noise[2], noise[3]), (noise[4], noise[5]))
     ]
-    numbers = np.array([*noise[:2], long_run[0], noise[3], long_run[1], noise[5], *outages[2:]])
+    slow = np.concatenate([np.repeat([[long_run[0], noise[3]], [long_run[1], noise[5]]], 3, axis=0), extra])
+    numbers = np.array([*noise[:2], *outages[2:]])
     return MekfInputs(
-        line, measured, source, unused, gaps, numbers, state, covariance, axes is not None, extra,
+        line, measured, source, unused, gaps, numbers, state, covariance, axes is not None, slow,
         gate_threshold(gate_probability, 3),
     )  # fmt: skip
 
@@ -277,10 +279,8 @@ def run_mekf(
     verdict = np.zeros(n, np.int64)
     with announced("the navigation filter"):
         kernels.mekf(
-            line.times, line.f, line.w, line.gap, line.row_of_node, earth.as_array(), ready.noise,
-            ready.state, ready.covariance, ready.axes, ready.extra, measured.node, measured.kind,
-            measured.value, measured.variance, measured.lever, measured.gauss_markov, ready.gate,
-            float(outages.patience), states, covariances, innovation, S, nis, verdict,
+            line, measured, earth.as_array(), ready.noise, ready.slow, ready.state, ready.covariance,
+            ready.axes, ready.gate, float(outages.patience), states, covariances, innovation, S, nis, verdict,
         )  # fmt: skip
     for gap in ready.gaps:
         unknown = (times > gap.start) & (times < gap.end)

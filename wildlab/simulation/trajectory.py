@@ -10,9 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from wildlab.geometry.frames import USUAL_GRAVITY, Array, euler_to_matrix, matrix_to_rotation_vector
 from wildlab.simulation.error_models import stream
@@ -108,7 +109,7 @@ def coordinated_attitude(
     return np.asarray(np.stack([x, y, np.cross(x, y)], axis=-1) @ euler_to_matrix(0.0, trim_pitch, 0.0))
 
 
-def _unit(vectors: Array) -> Array:
+def _unit(vectors: NDArray[Any]) -> Array:
     """(N, 3), each of length one."""
     return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
 
