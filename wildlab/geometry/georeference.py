@@ -20,9 +20,6 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.rays import RAY_STATUS
 
-#: Rows worked on at a time: three columns of them fit into the cache.
-BLOCK = 32_768
-
 
 def georeference_pixels(poses: CameraPoses, uv: ArrayLike, plane_down: ArrayLike) -> Array:
     """Where the rays of pixels meet a horizontal plane, one pose per pixel: direct georeferencing, H (5.13).
@@ -110,8 +107,6 @@ def pixel_rays(camera: Camera, uv: ArrayLike, R_nc: ArrayLike) -> Array:
     """
     xy = normalise(camera, uv)
     R = np.asarray(R_nc, float)
-    if R.ndim == 2:
-        return np.asarray(xy @ R[:, :2].T + R[:, 2])
     return np.asarray(R[..., :, 0] * xy[..., :1] + R[..., :, 1] * xy[..., 1:] + R[..., :, 2])
 
 
@@ -139,41 +134,7 @@ def pixel_to_plane(
     (N, 3) metres in n. Rows are NaN where the ray does not meet the plane in front of the camera: at or above
     the horizon, or a camera below the plane.
     """
-    uv, p, R = (np.asarray(a, float) for a in (uv, p_nc, R_nc))
-    plane = np.asarray(plane_down, float)
-    if uv.ndim != 2 or any(a.ndim > base and len(a) != len(uv) for a, base in ((p, 1), (R, 2), (plane, 0))):
-        return intersect_plane(pixel_rays(camera, uv, R), p, plane)
-    ground = np.empty((len(uv), 3))
-    for start in range(0, len(uv), BLOCK):
-        rows = slice(start, start + BLOCK)
-        one = [a[rows] if a.ndim > base else a for a, base in ((p, 1), (R, 2), (plane, 0))]
-        _fill_ground(ground[rows], normalise(camera, uv[rows]), *one)
-    return ground
-
-
-def _fill_ground(ground: Array, xy: Array, p: Array, R: Array, plane: Array) -> None:
-    """``intersect_plane(pixel_rays(...))`` written into ``ground`` (N, 3), one coordinate after the other.
-
-    Columns that lie side by side in memory, a block small enough for the cache: five times as fast as rows.
-    """
-    x, y = np.ascontiguousarray(xy.T)
-
-    def along(axis: int) -> Array:
-        d = R[..., axis, 0] * x
-        d += R[..., axis, 1] * y
-        d += R[..., axis, 2]
-        return np.asarray(d)
-
-    down, drop = along(2), plane - p[..., 2]
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        depth = drop / down
-        depth[~((down > 0) & (drop > 0))] = np.nan
-        for axis in (0, 1):
-            d = along(axis)
-            d *= depth
-            d += p[..., axis]
-            ground[:, axis] = d
-        ground[:, 2] = plane + 0.0 * depth  # exactly the plane, and NaN where there is no point
+    return intersect_plane(pixel_rays(camera, uv, R_nc), p_nc, plane_down)
 
 
 def intersect_plane(rays: ArrayLike, p_nc: ArrayLike, plane_down: ArrayLike) -> Array:
