@@ -373,14 +373,12 @@ def intersect_terrain(terrain: Terrain, rays: ArrayLike, p_nc: ArrayLike, furthe
             field="p_nc",
         )
     # Compiled functions are imported where they are called: a compiler takes its time to be imported.
-    from wildlab.geometry.compilation import announced
     from wildlab.geometry.kernels import walk_all
 
     grid = _to_grid(terrain, starts, whole=True)
     along = _to_grid(terrain, directions, whole=False)
     blocks, shapes = terrain._blocks
-    with announced("the walk over terrain"):
-        at, became = walk_all(terrain.height, blocks, shapes, grid, along, float(furthest), terrain._top)
+    at, became = walk_all(terrain.height, blocks, shapes, grid, along, float(furthest), terrain._top)
     points = np.asarray(starts + at[:, None] * directions)
     return Met(points, became)
 

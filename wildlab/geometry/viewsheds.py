@@ -411,22 +411,20 @@ def cast_rays(
         if not 0 < length < np.inf:
             raise WildlabError(f"a {name} of {length} m", "give metres above zero", field=name)
     # Compiled functions are imported where they are called: a compiler takes its time to be imported.
-    from wildlab.geometry.compilation import announced
 
     known = terrain.height[rows, columns]
     top = float(np.nanmax(known, initial=-np.inf)) if shorten else np.inf
-    with announced("lines of sight"):
-        found = cast_all(
-            terrain.height,
-            rows,
-            columns,
-            lens,
-            terrain.step,
-            float(step),
-            float(tolerance),
-            top,
-            terrain._top,
-        )
+    found = cast_all(
+        terrain.height,
+        rows,
+        columns,
+        lens,
+        terrain.step,
+        float(step),
+        float(tolerance),
+        top,
+        terrain._top,
+    )
     return Looked(*found)
 
 
@@ -475,10 +473,8 @@ def compare_angles(
     array([False, False])
     """
     rows, columns, lens = _prepared(terrain, nodes, p_nc)
-    from wildlab.geometry.compilation import announced
 
-    with announced("lines of sight"):
-        found = compare_all(terrain.height, rows, columns, lens, terrain.step, itself, signed, terrain._top)
+    found = compare_all(terrain.height, rows, columns, lens, terrain.step, itself, signed, terrain._top)
     return Looked(*found)
 
 

@@ -1,8 +1,4 @@
-"""The hot loops, compiled: strapdown steps and the MEKF.
-
-All compiled functions that call each other stay in this one file: the compiler's cache only looks at the
-file a function stands in, and would go on using the old version of what it calls in another one.
-"""
+"""The hot loops, compiled: strapdown steps and the MEKF."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wildlab.geometry.compilation import announced, compiled
+from wildlab.geometry.compilation import compiled
 from wildlab.geometry.frames import (
     Array,
     Origin,
@@ -295,59 +295,12 @@ def course_reference(
     return _reference(np.asarray(times, float) - latency, [1.0, 0.0, 0.0], v)
 
 
-class ObserverInputs(NamedTuple):
-    """What the compiled observer takes; positions and directions in e."""
-
-    line: Timeline
-    measured: Measurements
-    gains: Array
-    q: Array
-    bias: Array
-    x: Array
-    P: Array
-    unused: list[int]
-    gaps: list[Gap]
-
-
 def earth_axes(origin: Origin) -> tuple[Array, Array]:
     """Where n lies in e: position (3,), and ``R_en`` (3, 3)."""
     lat, lon, _ = origin
     north = [-np.sin(lat) * np.cos(lon), -np.sin(lat) * np.sin(lon), np.cos(lat)]
     east = [-np.sin(lon), np.cos(lon), 0.0]
     return geodetic_to_ecef(*origin), np.stack([north, east, np.cross(north, east)], axis=-1)
-
-
-def prepare(
-    imu: ImuSamples,
-    start: InitialState,
-    origin: Origin,
-    aiding: Sequence[Aiding],
-    gains: Gains,
-    wanted: Array,
-    max_gap: float,
-) -> ObserverInputs:
-    check_initial(start)
-    line, gaps = set_out(imu, start.time, aiding, wanted, max_gap)
-    p_e, R_en = earth_axes(origin)
-    in_e = [a._replace(value=a.value @ R_en.T + (p_e if a.kind == POSITION else 0.0)) for a in aiding]
-    measured, _, unused = gather(in_e, line)
-    seen = line.times[np.unique(measured.node[measured.kind == REFERENCE])]
-    apart = np.diff(seen) if len(seen) > 1 else [0.0]
-    numbers = np.array(
-        [
-            gains.k1, gains.k2, gains.k_i, gains.bias_bound, 1.2 * gains.bias_bound, gains.theta,
-            gains.force_noise**2, gains.correction_noise**2, gains.force_bound, 1.5 * float(np.median(apart)),
-        ]
-    )  # fmt: skip
-    state = np.asarray(start.state, float)
-    x = np.concatenate([p_e + R_en @ state[:3], R_en @ state[3:6], np.zeros(3)])
-    q = matrix_to_quaternion(R_en @ quaternion_to_matrix(state[6:10]))
-    # What the estimated force may be off by at first: the accelerometers' bias, and gravity leaning with
-    # roll.
-    force = (9.8**2 * start.covariance[6:9, 6:9] + start.covariance[9:12, 9:12]).trace() / 3
-    spread = [start.covariance[i : i + 3, i : i + 3].trace() / 3 for i in (0, 3)] + [force]
-    P = np.diag(np.repeat(spread, 3) / np.repeat([1.0, gains.theta**2, gains.theta**4], 3))
-    return ObserverInputs(line, measured, numbers, q, state[13:].copy(), x, P, unused, gaps)
 
 
 def run_observer(
@@ -390,19 +343,38 @@ def run_observer(
     """
     wanted = checked_imu(imu).times if output_times is None else np.asarray(output_times, float)
     times, row = np.unique(wanted, return_inverse=True)
-    ready = prepare(imu, start, origin, aiding, gains or Gains(), times, max_gap)
+    gains = gains or Gains()
+    check_initial(start)
+    line, gaps = set_out(imu, start.time, aiding, times, max_gap)
+    p_e, R_en = earth_axes(origin)
+    in_e = [a._replace(value=a.value @ R_en.T + (p_e if a.kind == POSITION else 0.0)) for a in aiding]
+    measured, _, unused = gather(in_e, line)
+    seen = line.times[np.unique(measured.node[measured.kind == REFERENCE])]
+    apart = np.diff(seen) if len(seen) > 1 else [0.0]
+    numbers = np.array(
+        [
+            gains.k1, gains.k2, gains.k_i, gains.bias_bound, 1.2 * gains.bias_bound, gains.theta,
+            gains.force_noise**2, gains.correction_noise**2, gains.force_bound, 1.5 * float(np.median(apart)),
+        ]
+    )  # fmt: skip
+    state = np.asarray(start.state, float)
+    x = np.concatenate([p_e + R_en @ state[:3], R_en @ state[3:6], np.zeros(3)])
+    q = matrix_to_quaternion(R_en @ quaternion_to_matrix(state[6:10]))
+    # What the estimated force may be off by at first: the accelerometers' bias, and gravity leaning with
+    # roll.
+    force = (9.8**2 * start.covariance[6:9, 6:9] + start.covariance[9:12, 9:12]).trace() / 3
+    spread = [start.covariance[i : i + 3, i : i + 3].trace() / 3 for i in (0, 3)] + [force]
+    P = np.diag(np.repeat(spread, 3) / np.repeat([1.0, gains.theta**2, gains.theta**4], 3))
     out = np.full((len(times), 16), np.nan)
-    with announced("the nonlinear observer"):
-        observe(ready.line, ready.measured, ready.gains, ready.q, ready.bias, ready.x, ready.P, out)
-    for gap in ready.gaps:
+    observe(line, measured, numbers, q, state[13:].copy(), x, P, out)
+    for gap in gaps:
         out[(times > gap.start) & (times < gap.end)] = np.nan
     rows = out[row]
-    p_e, R_en = earth_axes(origin)
     quaternion = np.full((len(wanted), 4), np.nan)
     filled = np.isfinite(rows[:, 0])
     if filled.any():
         quaternion[filled] = matrix_to_quaternion(R_en.T @ quaternion_to_matrix(rows[filled, :4]))
     return Observed(
         wanted, (rows[:, 7:10] - p_e) @ R_en, rows[:, 10:13] @ R_en, quaternion, rows[:, 4:7],
-        rows[:, 13:] @ R_en, ready.gaps, ready.unused,
+        rows[:, 13:] @ R_en, gaps, unused,
     )  # fmt: skip
