@@ -25,8 +25,7 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.corrections import Calibration, PosesAt, calibrated_poses
 from wildlab.geometry.covariances import ellipse_axes, inside_ellipse, pose_covariance
 from wildlab.geometry.frames import Array, Indices, Mask, ned_to_geodetic
-from wildlab.geometry.georeference import Terrain, georeference_pixels, pixels_to_terrain
-from wildlab.geometry.rays import RAY_STATUS
+from wildlab.geometry.georeference import RAY_STATUS, Terrain, georeference_pixels, pixels_to_terrain
 from wildlab.geometry.uncertainty import PoseErrors, ground_covariance
 
 #: Standard deviations assumed where neither the log nor the manifest states one; those of the attitude as in
@@ -291,7 +290,7 @@ def georeference(
     DataFrame
         The table of the observations with ``north_m``, ``east_m``, ``down_m``, the covariance ``cov_nn``,
         ``cov_ne``, ``cov_ee`` (m2) and ``ellipse`` (how the covariance was found). Over terrain also ``ray``:
-        what became of it, in the words of `wildlab.geometry.rays.RAY_STATUS`.
+        what became of it, in the words of `wildlab.geometry.georeference.RAY_STATUS`.
     """
     o = observations
     if errors is None:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError
-from wildlab.geometry.frames import Array, flat_earth, matrix_to_quaternion
+from wildlab.geometry.frames import Array, flat_earth, matrix_to_quaternion, quaternion_to_matrix
 from wildlab.navigation.mekf import InitialState
 from wildlab.navigation.strapdown import ImuSamples, checked_imu, integrate_strapdown
 
@@ -198,7 +198,7 @@ def align_from_baseline(
         t[i], imu, Kinematics(p[i], v, 2 * a), Reference(baseline_b, other[i] - p[i]),
         InitialSd(**{"heading_sd": baseline_sd / length, **sd}), gravity=gravity,
     )  # fmt: skip
-    from_arm = _turned(start.state[6:10], arm)
+    from_arm = quaternion_to_matrix(start.state[6:10]) @ arm
     return start._replace(state=np.concatenate([p[i] - from_arm, start.state[3:]]))
 
 
@@ -253,11 +253,6 @@ def align_from_course(
         t[i], imu, Kinematics(p[i], v[i], a), Reference([1.0, 0.0, 0.0], v[i]),
         InitialSd(**{"heading_sd": 0.4, "level_sd": 0.1, **sd}), gravity=gravity,
     )  # fmt: skip
-
-
-def _turned(q: Array, vector: Array) -> Array:
-    w, u = q[0], q[1:]
-    return np.asarray(vector + 2 * np.cross(u, np.cross(u, vector) + w * vector), float)
 
 
 def find_rest(
@@ -382,5 +377,5 @@ def align_at_rest(
     )
     q = towards(0.0).state[6:10]
     last = integrate_strapdown(part, p[i], v[i], q, flat_earth(gravity), max_gap=np.inf).quaternion[-1]
-    nose = _turned(last, np.array([1.0, 0.0, 0.0]))
+    nose = quaternion_to_matrix(last)[:, 0]
     return towards(float(np.arctan2(v[i, 1], v[i, 0]) - np.arctan2(nose[1], nose[0])))

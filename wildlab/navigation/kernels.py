@@ -88,12 +88,14 @@ def strapdown_step(x: Array, f: Array, w: Array, dt: float, earth: Array) -> tup
 
 
 @compiled
-def integrate(times: Array, f: Array, w: Array, earth: Array, start: Array, out: Array) -> None:
-    """Strapdown from the first row on; ``out`` (N, 16)."""
+def integrate(times: Array, f: Array, w: Array, earth: Array, start: Array) -> Array:
+    """Strapdown from the first row on, (N, 16)."""
+    out = np.empty((len(times), 16))
     out[0] = start
     for k in range(1, len(times)):
         f_mean, w_mean = (f[k - 1] + f[k]) / 2, (w[k - 1] + w[k]) / 2
         out[k] = strapdown_step(out[k - 1], f_mean, w_mean, times[k] - times[k - 1], earth)[0]
+    return out
 
 
 @compiled
@@ -182,11 +184,14 @@ def correct(x: Array, P: Array, H: Array, y: Array, R: Array, axes: bool) -> tup
 @compiled
 def mekf(
     line: Timeline, measured: Measurements, earth: Array, noise: Array, slow: Array, x: Array, P: Array,
-    axes: bool, gate: float, patience: float, states: Array, covariances: Array, innovations: Array,
-    spreads: Array, nis: Array, verdicts: Integers,
-) -> None:  # fmt: skip
-    """The whole filter over a timeline."""
-    n = len(P)
+    axes: bool, gate: float, patience: float, rows: int,
+) -> tuple[Array, Array, Array, Array, Array, Integers]:  # fmt: skip
+    """The whole filter over a timeline: states and covariances of so many rows, and of each measurement the
+    innovation, its covariance, NIS and verdict."""
+    n, events = len(P), len(measured.node)
+    states, covariances = np.full((rows, 16), np.nan), np.full((rows, N_ERRORS, N_ERRORS), np.nan)
+    innovations, spreads = np.full((events, 3), np.nan), np.full((events, 3, 3), np.nan)
+    nis, verdicts = np.full(events, np.nan), np.zeros(events, np.int64)
     rejected_since = np.full(2, np.nan)
     event = 0
     for k in range(len(line.times)):
@@ -206,7 +211,7 @@ def mekf(
                 x, F = transition(x, f, w, dt, earth, axes, n)
             x[10:] *= kept
             P = carry(P, F, kept, driven, dt, q_v, q_a)
-        while event < len(measured.node) and measured.node[event] == k:
+        while event < events and measured.node[event] == k:
             kind, first = measured.kind[event], measured.gauss_markov[event]
             y, H = predict_measurement(kind, x, line.w[k], measured.value[event], measured.lever[event], n)
             if first >= 0:
@@ -233,3 +238,4 @@ def mekf(
         if row >= 0:
             states[row] = x[:16]
             covariances[row] = P[:N_ERRORS, :N_ERRORS]
+    return states, covariances, innovations, spreads, nis, verdicts

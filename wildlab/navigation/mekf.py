@@ -235,15 +235,10 @@ def run_mekf(
         for sd, time in ((noise[2], noise[3]), (noise[4], noise[5]))
     ]
     slow = np.concatenate([np.repeat(biases, 3, axis=0), extra])
-    states, covariances = np.full((len(times), 16), np.nan), np.full((len(times), 15, 15), np.nan)
-    n = len(measured.node)
-    innovation, S, nis = np.full((n, 3), np.nan), np.full((n, 3, 3), np.nan), np.full(n, np.nan)
-    verdict = np.zeros(n, np.int64)
-    kernels.mekf(
+    states, covariances, innovation, S, nis, verdict = kernels.mekf(
         line, measured, earth.as_array(), np.array([*noise[:2], *outages[2:]]), slow,
         np.concatenate([start.state, np.zeros(len(extra))]), block_diag(start.covariance, beyond),
-        axes is not None, gate_threshold(gate_probability, 3), float(outages.patience), states, covariances,
-        innovation, S, nis, verdict,
+        axes is not None, gate_threshold(gate_probability, 3), float(outages.patience), len(times),
     )  # fmt: skip
     for gap in gaps:
         unknown = (times > gap.start) & (times < gap.end)
