@@ -363,11 +363,6 @@ def intersect_terrain(terrain: Terrain, rays: ArrayLike, p_nc: ArrayLike, furthe
     -------
     Met
 
-    Raises
-    ------
-    WildlabError
-        Where there are neither as many starts as rays, nor one.
-
     Examples
     --------
     >>> import numpy as np
@@ -376,13 +371,7 @@ def intersect_terrain(terrain: Terrain, rays: ArrayLike, p_nc: ArrayLike, furthe
     [[50.  0. -5.]]
     """
     directions = np.atleast_2d(np.asarray(rays, float))
-    starts = np.atleast_2d(np.asarray(p_nc, float))
-    if directions.shape[-1] != 3 or starts.shape[-1] != 3 or len(starts) not in (1, len(directions)):
-        raise WildlabError(
-            f"starts of the shape {starts.shape} for rays of the shape {directions.shape}",
-            "give one start for each ray, or one for all, three columns each",
-            field="p_nc",
-        )
+    starts = np.broadcast_to(np.asarray(p_nc, float), directions.shape)
     # Compiled functions are imported where they are called: a compiler takes its time to be imported.
     from wildlab.geometry.kernels import walk_all
 

@@ -229,10 +229,9 @@ def walk(
 def walk_all(
     height: Array, blocks: Array, shapes: Array, starts: Array, rays: Array, furthest: float, top: float
 ) -> tuple[Array, Array]:
-    """`walk` for every row of ``starts`` and ``rays``; one start may stand for all."""
+    """`walk` for every row of ``starts`` and ``rays``."""
     count = rays.shape[0]
     at, became = np.empty(count), np.empty(count, np.int8)
-    one = starts.shape[0] == 1
     for n in range(count):
-        at[n], became[n] = walk(height, blocks, shapes, starts[0 if one else n], rays[n], furthest, top)
+        at[n], became[n] = walk(height, blocks, shapes, starts[n], rays[n], furthest, top)
     return at, became

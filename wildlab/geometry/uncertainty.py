@@ -26,7 +26,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.errors import WildlabError
 from wildlab.geometry.camera import normalise, normalise_jacobian
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.covariances import chi2_quantile
@@ -343,11 +342,10 @@ def ground_covariance(
     Raises
     ------
     WildlabError
-        Where there is another number of poses, of planes or of errors than of pixels.
+        Where there is another number of poses than of pixels.
     """
     pixels = np.atleast_2d(np.asarray(uv, float))
     n = len(pixels)
-    _check_errors(errors, n)
     terrain = ground if isinstance(ground, Terrain) else None
     planes = np.zeros(n) if terrain else np.broadcast_to(np.asarray(ground, float), n)
     if terrain:
@@ -478,16 +476,6 @@ def _normals(slopes: ArrayLike) -> Array:
     """(..., 3) normals of slopes, into the ground: ``down + height(north, east)`` grows along them."""
     given = np.asarray(slopes, float)
     return np.concatenate([given, np.ones((*given.shape[:-1], 1))], axis=-1)
-
-
-def _check_errors(errors: PoseErrors, n: int) -> None:
-    for name, axes in (("pixel", 2), ("pose", 2), ("plane", 0)):
-        shape = np.shape(getattr(errors, name))
-        lead = shape[: len(shape) - axes]
-        if lead not in ((), (n,)):
-            raise WildlabError(
-                f"errors of the rows {lead} for {n} pixels", "give one for each, or one for all", field=name
-            )
 
 
 def _bent(

@@ -63,16 +63,7 @@ def _aiding(
     kind: int, times: ArrayLike, value: ArrayLike, sd: ArrayLike, lever: ArrayLike, what: str
 ) -> Aiding:
     t = np.asarray(times, float)
-    shape = (len(t), 3) if t.ndim == 1 else (0, 3)
-    try:
-        z, spread, arm = (np.array(np.broadcast_to(np.asarray(a, float), shape)) for a in (value, sd, lever))
-    except ValueError:
-        raise WildlabError(
-            f"{what} of shape {np.shape(value)} and standard deviations of shape {np.shape(sd)} do not go "
-            f"with times of shape {t.shape}",
-            "give times (N,), values (N, 3), and standard deviations (N, 3), (3,) or one number",
-            field=what,
-        ) from None
+    z, spread, arm = (np.broadcast_to(np.asarray(a, float), (len(t), 3)) for a in (value, sd, lever))
     keep = np.isfinite(t) & np.isfinite(z).all(axis=1)
     z, spread, arm, t = z[keep], spread[keep], arm[keep], t[keep]
     if not (np.isfinite(spread).all() and (spread > 0).all()):
@@ -119,7 +110,7 @@ def positions(
     Raises
     ------
     WildlabError
-        For shapes that do not fit, or a standard deviation that is not positive.
+        For a standard deviation that is not positive.
     ValueError
         For a ``gauss_markov_sd`` that is neither (3,) nor one number.
     """
@@ -158,7 +149,7 @@ def velocities(
     Raises
     ------
     WildlabError
-        For shapes that do not fit, or a standard deviation that is not positive.
+        For a standard deviation that is not positive.
     """
     t = np.asarray(times, float) - latency
     return _aiding(kernels.VELOCITY, t, v_n, sd, lever_arm, "GNSS velocities")
@@ -181,7 +172,7 @@ def standstill(times: ArrayLike, sd: float) -> Aiding:
     Raises
     ------
     WildlabError
-        For shapes that do not fit, or a standard deviation that is not positive.
+        For a standard deviation that is not positive.
     """
     return _aiding(kernels.VELOCITY, times, np.zeros(3), sd, np.zeros(3), "times of standing still")
 

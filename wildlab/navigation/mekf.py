@@ -137,12 +137,6 @@ def _extra(aiding: Sequence[Aiding], axes: AxisErrors | None) -> tuple[Array, Ar
 def check_initial(start: InitialState) -> None:
     """Refuse an initial state that is not finite, or whose covariance is none."""
     state, P = np.asarray(start.state, float), np.asarray(start.covariance, float)
-    if state.shape != (16,) or P.shape != (15, 15):
-        raise WildlabError(
-            f"a state of the shape {state.shape} and a covariance of the shape {P.shape}",
-            "give (16,) and (15, 15)",
-            field="start",
-        )
     lost = np.flatnonzero(~np.isfinite(state))
     if len(lost):
         raise WildlabError(

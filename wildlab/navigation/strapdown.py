@@ -174,12 +174,6 @@ def checked_imu(imu: ImuSamples) -> ImuSamples:
         If shapes do not fit, fewer than two samples are left, or times do not increase.
     """
     t, f, w = (np.asarray(part, float) for part in imu)
-    if t.ndim != 1 or f.shape != (len(t), 3) or w.shape != (len(t), 3):
-        raise WildlabError(
-            f"inertial samples have the shapes {t.shape}, {f.shape} and {w.shape}",
-            "give times (N,), specific force (N, 3) and angular rate (N, 3)",
-            field="imu",
-        )
     whole = np.isfinite(t) & np.isfinite(f).all(axis=1) & np.isfinite(w).all(axis=1)
     t, f, w = t[whole], f[whole], w[whole]
     if len(t) < 2:
