@@ -375,8 +375,12 @@ def intersect_terrain(terrain: Terrain, rays: ArrayLike, p_nc: ArrayLike, furthe
     # Compiled functions are imported where they are called: a compiler takes its time to be imported.
     from wildlab.geometry.kernels import walk_all
 
-    grid = _to_grid(terrain, starts, whole=True)
-    along = _to_grid(terrain, directions, whole=False)
+    # Columns, rows, metres upwards.
+    scale = [terrain.step, terrain.step, -1.0]
+    grid, along = (
+        np.ascontiguousarray(vectors[:, [1, 0, 2]] / scale)
+        for vectors in (starts - [terrain.north, terrain.east, 0.0], directions)
+    )
     blocks, shapes = terrain._blocks
     at, became = walk_all(terrain.height, blocks, shapes, grid, along, float(furthest), terrain._top)
     points = np.asarray(starts + at[:, None] * directions)
@@ -406,19 +410,6 @@ def pixels_to_terrain(poses: CameraPoses, uv: ArrayLike, terrain: Terrain) -> Me
     """
     pixels, _ = matching(poses, np.atleast_2d(np.asarray(uv, float)))
     return intersect_terrain(terrain, pixel_rays(poses.camera, pixels, poses.R_nc), poses.p_nc)
-
-
-def _to_grid(terrain: Terrain, vectors: Array, *, whole: bool) -> Array:
-    """(N, 3) of n as columns, rows, metres upwards; ``whole`` for points, not for directions."""
-    origin = (terrain.east, terrain.north) if whole else (0.0, 0.0)
-    return np.stack(
-        [
-            (vectors[:, 1] - origin[0]) / terrain.step,
-            (vectors[:, 0] - origin[1]) / terrain.step,
-            -vectors[:, 2],
-        ],
-        axis=-1,
-    )
 
 
 def _pyramid(height: NDArray[np.float32], top: float) -> tuple[NDArray[np.float32], NDArray[np.int64]]:

@@ -176,20 +176,14 @@ def after_images(
     return seen
 
 
-@compiled
 def worth_beyond(left: Any, middles: Any, parents: Any, ends: Any, length: float) -> Any:
     """What is left to know in blocks, counted less the further they are from where a step ends, (K,) m^2.
 
     ``left`` (B, S) of each state's blocks, ``middles`` (S, 2), ``ends`` (K, 2) or more columns, ``length``
     the distance at which a block counts 1/e.
     """
-    out = np.zeros(len(parents))
-    for k in range(len(parents)):
-        for i in range(len(middles)):
-            if left[parents[k], i] > 0:
-                away = np.hypot(middles[i, 0] - ends[k, 0], middles[i, 1] - ends[k, 1])
-                out[k] += left[parents[k], i] * np.exp(-away / length)
-    return out
+    away = np.hypot(*(middles[:, None] - ends[:, :2]).T)
+    return (np.maximum(left[parents], 0.0) * np.exp(-away / length)).sum(axis=1)
 
 
 @compiled
