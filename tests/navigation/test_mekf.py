@@ -5,11 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.navigation.flights import (
-    GNSS_SD,
     GRAVITY,
-    LEVERS,
     NOISE,
-    START_SD,
     begin,
     fixes,
     fly,
@@ -17,12 +14,10 @@ from tests.navigation.flights import (
 )  # fmt: skip
 from wildlab.geometry.frames import flat_earth, matrix_to_rotation_vector, quaternion_to_matrix
 from wildlab.navigation import kernels
-from wildlab.navigation.aiding import positions, standstill
 from wildlab.navigation.mekf import (
     ACCEPTED,
     FORCED,
     REJECTED,
-    InitialState,
     Outages,
     pose_covariance,
     run_mekf,
@@ -186,20 +181,6 @@ def test_a_gap_is_said_and_crossed_with_doubt(flight):
     assert (np.abs(errors) < 5 * spread).all()
 
 
-def test_latency_puts_a_fix_where_it_belongs(flight):
-    imu, start, antennas, _ = spoilt(flight, 8)
-    late = [a._replace(times=a.times + 0.25) for a in antennas]
-    again = [
-        positions(a.times, a.value, GNSS_SD, lever, latency=0.25)
-        for a, lever in zip(late, LEVERS, strict=True)
-    ]
-    wanted = flight.imu.times[8000::50]
-    known = run_mekf(imu, start, NOISE, EARTH, again, wanted)
-    assert np.abs(known.position - flight.motion.position[8000::50]).max() < 0.1
-    ignored = run_mekf(imu, start, NOISE, EARTH, late, wanted, gate_probability=1.0)
-    assert np.median(np.linalg.norm(ignored.position - flight.motion.position[8000::50], axis=1)) > 3.0
-
-
 def test_wanted_times_may_repeat_lie_outside_or_be_unknown(flight):
     imu, start, antennas, _ = spoilt(flight, 12)
     wanted = np.array([50.0, np.nan, 10.0, 50.0, -3.0, 1000.0])
@@ -234,21 +215,6 @@ def test_consistent_over_fifty_flights(flight):
         for name, value in zip(("position", "velocity", "attitude"), mean[:, part].mean(axis=1), strict=True):
             assert 0.7 < value < 1.4, (phase, name)
     assert np.mean(nis) == pytest.approx(1.0, abs=0.03)
-
-
-def test_standing_still_holds_the_velocity():
-    times = np.arange(0, 60, 0.02)
-    rng = np.random.default_rng(11)
-    imu = ImuSamples(
-        times,
-        np.array([0, 0, -GRAVITY]) + 0.02 * rng.standard_normal((len(times), 3)),
-        0.001 * rng.standard_normal((len(times), 3)),
-    )
-    start = InitialState(0.0, np.concatenate([np.zeros(6), [1.0], np.zeros(9)]), np.diag(START_SD**2))
-    held = run_mekf(imu, start, NOISE, EARTH, [standstill(np.arange(1, 60, 1.0), 0.01)], [59.9])
-    free = run_mekf(imu, start, NOISE, EARTH, [], [59.9])
-    assert np.abs(held.velocity).max() < 0.02
-    assert np.sqrt(held.covariance[0, 3, 3]) < 0.02 < np.sqrt(free.covariance[0, 3, 3])
 
 
 @pytest.mark.parametrize("seed", range(6))

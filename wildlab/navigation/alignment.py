@@ -255,10 +255,13 @@ def align_from_course(
     )  # fmt: skip
 
 
+#: Level speed (m/s) from which it counts as having taken off, and how long a rest must be, s.
+TAKEN_OFF, SHORTEST = 8.0, 10.0
+
+
 def find_rest(
-    imu: ImuSamples, times: ArrayLike, v_n: ArrayLike, *, min_speed: float = 8.0, shortest: float = 10.0,
-    longest: float = 30.0,
-) -> tuple[float, float] | None:  # fmt: skip
+    imu: ImuSamples, times: ArrayLike, v_n: ArrayLike, *, longest: float = 30.0
+) -> tuple[float, float] | None:
     """When it last stood still before it took off.
 
     Still is a second in which neither force nor rate changes as it does in anybody's hands, and in which no
@@ -270,10 +273,8 @@ def find_rest(
         Inertial measurements, from before the flight on.
     times, v_n
         (N,) s and (N, 3) m/s in n, as in :func:`align_from_course`.
-    min_speed
-        Level speed (m/s) from which it counts as having taken off.
-    shortest, longest
-        How long a rest must be and what it is cut to, s.
+    longest
+        What a rest is cut to, s.
 
     Returns
     -------
@@ -287,9 +288,9 @@ def find_rest(
     """
     t, v = np.asarray(times, float), np.asarray(v_n, float)
     samples = checked_imu(imu)
-    flown = t[np.hypot(v[:, 0], v[:, 1]) >= min_speed]
+    flown = t[np.hypot(v[:, 0], v[:, 1]) >= TAKEN_OFF]
     first, seconds = samples.times[0], int((flown.min(initial=samples.times[-1]) - samples.times[0]) // 1.0)
-    if seconds < shortest:
+    if seconds < SHORTEST:
         return None
     before = samples.times < first + seconds
     second = (samples.times[before] - first).astype(int)
@@ -304,7 +305,7 @@ def find_rest(
     still[(t[moving] - first).astype(int)] = False
     edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]])))
     for begin, end in edges.reshape(-1, 2)[::-1]:
-        if end - begin >= shortest:
+        if end - begin >= SHORTEST:
             return float(first + max(begin, end - longest)), float(first + end)
     return None
 

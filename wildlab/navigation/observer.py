@@ -202,15 +202,6 @@ class Observed(NamedTuple):
     unused: list[int]
 
 
-def _reference(times: ArrayLike, in_b: ArrayLike, in_n: ArrayLike) -> Aiding:
-    t = np.asarray(times, float)
-    b, n = (np.array(np.broadcast_to(np.asarray(a, float), (len(t), 3))) for a in (in_b, in_n))
-    sizes = np.linalg.norm(b, axis=1), np.linalg.norm(n, axis=1)
-    keep = np.isfinite(t) & (sizes[0] > 0) & (sizes[1] > 0) & np.isfinite(sizes[0] + sizes[1])
-    b, n = b[keep] / sizes[0][keep, None], n[keep] / sizes[1][keep, None]
-    return Aiding(REFERENCE, t[keep], n, np.ones_like(n), b)
-
-
 def baseline_reference(
     times: ArrayLike, p_first: ArrayLike, p_second: ArrayLike, lever_first: ArrayLike, lever_second: ArrayLike
 ) -> Aiding:
@@ -236,7 +227,7 @@ def baseline_reference(
         For shapes that do not fit.
     """
     in_b = np.asarray(lever_second, float) - np.asarray(lever_first, float)
-    return _reference(times, in_b, np.asarray(p_second, float) - np.asarray(p_first, float))
+    return field_reference(times, in_b, np.asarray(p_second, float) - np.asarray(p_first, float))
 
 
 def field_reference(times: ArrayLike, field_b: ArrayLike, field_n: ArrayLike) -> Aiding:
@@ -261,24 +252,25 @@ def field_reference(times: ArrayLike, field_b: ArrayLike, field_n: ArrayLike) ->
     ValueError
         For shapes that do not fit.
     """
-    return _reference(times, field_b, field_n)
+    t = np.asarray(times, float)
+    b, n = (np.array(np.broadcast_to(np.asarray(a, float), (len(t), 3))) for a in (field_b, field_n))
+    sizes = np.linalg.norm(b, axis=1), np.linalg.norm(n, axis=1)
+    keep = np.isfinite(t) & (sizes[0] > 0) & (sizes[1] > 0) & np.isfinite(sizes[0] + sizes[1])
+    b, n = b[keep] / sizes[0][keep, None], n[keep] / sizes[1][keep, None]
+    return Aiding(REFERENCE, t[keep], n, np.ones_like(n), b)
 
 
-def course_reference(
-    times: ArrayLike, v_n: ArrayLike, min_speed: float = 8.0, latency: float = 0.0
-) -> Aiding:
+def course_reference(times: ArrayLike, v_n: ArrayLike, min_speed: float = 8.0) -> Aiding:
     """The nose along the velocity over the ground. Beyond H.
 
     Parameters
     ----------
     times
-        (N,) s, as stamped.
+        (N,) s, when they were valid.
     v_n
         (N, 3) m/s in n; rows with NaN are left out.
     min_speed
         Level speed (m/s) from which a course counts.
-    latency
-        How long before its stamp a velocity was valid, s.
 
     Returns
     -------
@@ -292,7 +284,7 @@ def course_reference(
     """
     v = np.array(v_n, float)
     v[~(np.hypot(v[:, 0], v[:, 1]) >= min_speed)] = np.nan
-    return _reference(np.asarray(times, float) - latency, [1.0, 0.0, 0.0], v)
+    return field_reference(times, [1.0, 0.0, 0.0], v)
 
 
 def earth_axes(origin: Origin) -> tuple[Array, Array]:

@@ -14,7 +14,6 @@ Where a change belongs:
   `target_motion`, and the ground in `landscape`;
 - sensors: `onboard_sensors`, and the `error_models` that they share; what is said of them, and what they are:
   `manifest`;
-- speed: `kernels`, compiled;
-- tables: `camera_detections`;
-- the whole flight: `twins`; what its camera would have seen, as images with labels: `scene`.
+- the whole flight, and what is found in its images: `twins`; what its camera would have seen, as images with
+  labels: `scene`.
 """

@@ -138,12 +138,21 @@ def fixed_wing_trajectory(
     Times (N,) s -> `Motion`.
     """
 
+    def attitude(t: Array, v: Array, a: Array) -> Array:
+        return coordinated_attitude(v, a, wind=wind, trim_pitch=trim_pitch, gravity=gravity)
+
+    return _along(path, attitude, gusts)
+
+
+def _along(
+    path: FlightPath, attitude: Callable[[Array, Array, Array], Array], gusts: AttitudeDisturbance | None
+) -> Trajectory:
+    """Motion with an attitude by times, velocities and accelerations, and gusts about it."""
+
     def motion(times: Array) -> Motion:
         t = np.asarray(times, float)
         p, v, a = path(t)
-        calm = Motion(
-            t, p, v, a, coordinated_attitude(v, a, wind=wind, trim_pitch=trim_pitch, gravity=gravity)
-        )
+        calm = Motion(t, p, v, a, attitude(t, v, a))
         return calm if gusts is None else turned(calm, gusts)
 
     return motion
@@ -180,18 +189,14 @@ def thrust_aligned_trajectory(
     Times (N,) s -> `Motion`.
     """
 
-    def motion(times: Array) -> Motion:
-        t = np.asarray(times, float)
-        p, v, a = path(t)
+    def attitude(t: Array, v: Array, a: Array) -> Array:
         z = _unit(np.array([0.0, 0.0, 1.0]) - a / gravity)
         nose = heading(t)
         ahead = np.stack([np.cos(nose), np.sin(nose), np.zeros(len(t))], axis=-1)
         y = _unit(np.cross(z, ahead))
-        R = np.stack([np.cross(y, z), y, z], axis=-1) @ euler_to_matrix(0.0, trim_pitch, 0.0)
-        calm = Motion(t, p, v, a, R)
-        return calm if gusts is None else turned(calm, gusts)
+        return np.asarray(np.stack([np.cross(y, z), y, z], axis=-1) @ euler_to_matrix(0.0, trim_pitch, 0.0))
 
-    return motion
+    return _along(path, attitude, gusts)
 
 
 #: Samples of the bank per second, Hz: many within the two seconds that an airframe takes to roll.

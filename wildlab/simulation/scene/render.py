@@ -28,8 +28,8 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera, normalise
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import ground_to_pixel
-from wildlab.simulation.camera_detections import moments, visible_part
 from wildlab.simulation.scene import kernels
+from wildlab.simulation.twins import moments, visible_part
 
 #: Side (m) and cells along it of the tiles of waves, of ripples, and of patches.
 WAVES, RIPPLES, PATCHES = (256.0, 512), (16.0, 256), (512.0, 128)
