@@ -545,11 +545,12 @@ def show_twins(report: Report, twins: Sequence[str], study: str) -> None:
     """
     report.section("What was simulated")
     for twin in twins:
-        table = parameters_table(twin)
+        loaded = load_twin(twin)
+        table = parameters_table(loaded)
         report.table(
             table,
             fold=f"The twin {twin}: {status_words(table)}",
-            caption=f"Every parameter of the twin. {fit_words(load_published(study), load_twin(twin))}",
+            caption=f"Every parameter of the twin. {fit_words(load_published(study), loaded)}",
         )
 
 
