@@ -308,7 +308,7 @@ class Terrain:
         (N, 2) metres upwards for a metre north, and for a metre east; NaN as `heights_at`.
         """
         i, j, u, v = self._cells(north_east)
-        h = self.height.astype(float, copy=False) if self.height.size < 1e6 else self.height
+        h = self.height
         a, b, c, d = (np.asarray(h[p, q], float) for p, q in ((i, j), (i, j + 1), (i + 1, j), (i + 1, j + 1)))
         with np.errstate(invalid="ignore"):
             north = (1 - u) * (c - a) + u * (d - b)

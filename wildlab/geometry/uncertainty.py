@@ -356,7 +356,7 @@ def ground_covariance(
         slopes = 0.0 * points[:, :2]
     covariance = _linear(terrain_jacobians(poses, pixels, points, slopes), errors)
     linear = np.isfinite(covariance).all(axis=(1, 2))
-    doubtful = _curved(poses, pixels, points, slopes, covariance, errors)
+    doubtful = linear & _curved(poses, pixels, points, slopes, covariance, errors)
     if terrain:
         # A ray may end where the slope has no height beside it: a point without a plane is sampled, too.
         doubtful |= np.isfinite(points).all(axis=1) & ~linear
@@ -385,7 +385,7 @@ def _curved(
     """Where the linear covariance (N, 2, 2) of a touching plane is known to be wrong."""
     arc = arc_bend(points[:, :2] - poses.p_nc[..., :2], ray_heading_sd(poses, errors), covariance)
     bent = (arc > ARC) | ~(ray_flatness(poses, pixels, errors, slopes) <= FLAT)
-    return np.asarray(np.isfinite(covariance).all(axis=(1, 2)) & bent)
+    return np.asarray(bent)
 
 
 def sample_ground(

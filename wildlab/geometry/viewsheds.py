@@ -13,7 +13,6 @@ metres upwards.
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,7 +22,7 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera, distort, normalise
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.compilation import compiled
-from wildlab.geometry.frames import Array, wrap
+from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import HIT, MISSED, Terrain, intersect_terrain, pixel_rays
 
 #: A line of sight ends this share of its length before the point: the point lies on the ground itself.
@@ -187,16 +186,12 @@ def _outline(poses: CameraPoses, per_side: int) -> Array:
 
 def _on_circle(points: Array, near: NDArray[np.bool_], middle: Array, furthest: float) -> Array:
     """Points of a circle in place of those not near, evenly between the near ones beside each run."""
-    count, found = len(points), np.full(points.shape, np.nan)
     bearing = np.arctan2(points[:, 1] - middle[1], points[:, 0] - middle[0])
-    first = int(np.flatnonzero(near)[0])
-    order = (first + np.arange(count + 1)) % count  # begins and ends with a near one
-    stops = np.flatnonzero(near[order])
-    for a, b in pairwise(stops):
-        turn = float(wrap(bearing[order[b]] - bearing[order[a]]))
-        for k in range(a + 1, b):
-            angle = bearing[order[a]] + turn * (k - a) / (b - a)
-            found[order[k]] = middle + furthest * np.array([np.cos(angle), np.sin(angle)])
+    order = (int(np.flatnonzero(near)[0]) + np.arange(len(points) + 1)) % len(points)
+    stops = np.flatnonzero(near[order])  # begins and ends with a near one
+    angle = np.interp(np.arange(len(order)), stops, np.unwrap(bearing[order[stops]]))
+    found = np.empty(points.shape)
+    found[order] = middle + furthest * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     return found[~near]
 
 

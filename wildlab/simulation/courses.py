@@ -26,6 +26,7 @@ from wildlab.simulation.manifest import true_mount, twin_manifest
 from wildlab.simulation.parameters import Group, TwinParameters
 from wildlab.simulation.target_motion import enclosure_axes
 from wildlab.simulation.trajectory import (
+    NO_DISTURBANCE,
     AttitudeDisturbance,
     Disturbance,
     FlightPath,
@@ -34,7 +35,6 @@ from wildlab.simulation.trajectory import (
     Trajectory,
     band_limited_disturbance,
     fixed_wing_trajectory,
-    no_disturbance,
     thrust_aligned_trajectory,
 )
 
@@ -190,7 +190,7 @@ def laps_path(laps: Laps, altitude: ArrayLike, errors: ControlErrors | None = No
     )
     interval = laps.roll_time / _RISE
     spline = _smoothed(knots, rough, interval)
-    off = errors or ControlErrors(no_disturbance(), no_disturbance(), no_disturbance())
+    off = errors or ControlErrors(NO_DISTURBANCE, NO_DISTURBANCE, NO_DISTURBANCE)
     signs = (1.0, 1.0, -1.0)
 
     def path(times: Array) -> tuple[Array, Array, Array]:
@@ -333,7 +333,7 @@ def loiter_path(
     w = np.asarray(wind, float)
     if not np.hypot(*w) < airspeed or not radius > 0:
         raise ValueError("the airspeed must exceed the wind, and the radius zero")
-    off_radius, off_altitude = radius_error or no_disturbance(), altitude_error or no_disturbance()
+    off_radius, off_altitude = radius_error or NO_DISTURBANCE, altitude_error or NO_DISTURBANCE
     sense = 1.0 if turn == "clockwise" else -1.0
     circle = _Circle(radius, airspeed, w, sense, start_angle)
     mean, series = _times_of_angles(circle)

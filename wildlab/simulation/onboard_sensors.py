@@ -199,7 +199,7 @@ def _swing(periods: Array) -> Array:
 
 def gimbal_table(gimbal: Group, duration: float, seed: int) -> pd.DataFrame:
     """What the gimbal says about its angles."""
-    times = np.arange(math.floor(duration * gimbal.rate.si + 1e-9) + 1) / gimbal.rate.si
+    times = sample_times(gimbal.rate.si, duration)
     pan, tilt = gimbal_angles(gimbal, times)
     error = gimbal.noise.si * stream(seed, "gimbal").standard_normal((2, len(times)))
     return pd.DataFrame({"time_s": times, "pan_rad": pan + error[0], "tilt_rad": tilt + error[1]})

@@ -46,10 +46,8 @@ class Disturbance:
         return np.multiply.outer(np.asarray(times, float), self.frequencies) + self.phases
 
 
-def no_disturbance() -> Disturbance:
-    """The signal that is zero."""
-    return Disturbance(np.zeros(1), np.ones(1), np.zeros(1))
-
+#: The signal that is zero.
+NO_DISTURBANCE = Disturbance(np.zeros(1), np.ones(1), np.zeros(1))
 
 #: Roll, pitch and yaw (rad) about a body's own axes.
 AttitudeDisturbance = tuple[Disturbance, Disturbance, Disturbance]
