@@ -10,6 +10,6 @@ Objects using UAVs with Optical Sensors, doctoral thesis, NTNU 2019.
 - `run_mekf`: the multiplicative extended Kalman filter; `run_observer`: the nonlinear observer.
 - `integrate_strapdown`: inertial measurements alone.
 - `align_at`, `align_from_baseline`, `align_from_course`, `align_at_rest`: where they start.
-- `positions`, `velocities`: aiding measurements.
+- `positions`, `velocities`, `standstill`: aiding measurements.
 - `signs_of_trouble`: what of an estimate should not be believed.
 """
