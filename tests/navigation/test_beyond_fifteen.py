@@ -31,7 +31,7 @@ def test_transition_with_axes_is_the_derivative_of_a_step(seed):
     """By finite differences of readings from axes that are a little wrong."""
     rng = np.random.default_rng(seed)
     x, f, w, dt = some_state(rng), rng.uniform(-15, 15, 3), rng.uniform(-1, 1, 3), 0.01
-    earth = flat_earth(GRAVITY)
+    earth = flat_earth(GRAVITY).as_array()
 
     def step(errors):
         # What there is, where that much of the reading came of the axes.

@@ -58,7 +58,7 @@ def differences(function, steps):
 def test_transition_is_the_derivative_of_a_step(seed):
     rng = np.random.default_rng(seed)
     x, f, w = some_state(rng), rng.uniform(-15, 15, 3), rng.uniform(-1, 1, 3)
-    earth, dt = flat_earth(GRAVITY), 0.01
+    earth, dt = flat_earth(GRAVITY).as_array(), 0.01
     after, first_nine = kernels.transition(x, f, w, dt, earth, False, 15)
     found = differences(
         lambda e: between(after, kernels.strapdown_step(shifted(x, e), f, w, dt, earth)[0]),

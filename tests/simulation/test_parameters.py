@@ -120,7 +120,7 @@ def test_units_are_converted_once():
 
 
 def test_the_table_names_value_unit_and_reason():
-    table = parameters_table(load_twin("static-antenna")).set_index("parameter")
+    table = parameters_table("static-antenna").set_index("parameter")
     assert table.loc["camera: fx"].tolist() == ["1159.2", "px", "published", "H (2.3)"]
     assert table.index.is_unique
     assert len(table) == len(list(each_parameter(load_twin("static-antenna"))))

@@ -34,7 +34,7 @@ def test_the_names_of_tables_are_those_of_the_published_numbers():
         for study in ("static-point", "coloured-noise-drifting")
         for source in load_published(study)["source"]
     }
-    assert set(fitted_to(load_twin("slow-vessel"))) <= typed
+    assert set(fitted_to("slow-vessel")) <= typed
     assert "no test" not in fit_words(load_published("slow-vessel"), load_twin("slow-vessel"))
 
 

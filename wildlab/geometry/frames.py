@@ -396,6 +396,10 @@ class Earth(NamedTuple):
     curvature: float
     rate: tuple[float, float, float]
 
+    def as_array(self) -> Array:
+        """Gravity, gradient, curvature and the three parts of the rate, (6,), as compiled code takes them."""
+        return np.array([self.gravity, self.gradient, self.curvature, *self.rate])
+
 
 def normal_gravity(latitude: ArrayLike, height: ArrayLike = 0.0) -> Array:
     """Gravity of the WGS84 ellipsoid, m/s^2: Somigliana's formula, to second order in the height.

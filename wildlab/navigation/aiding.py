@@ -179,22 +179,21 @@ def gather(
     """
     low, high = line.times[0], line.times[-1]
     inside = [(source.times >= low) & (source.times <= high) for source in aiding]
-    counts = np.array([keep.sum() for keep in inside], np.int64)
-    unused = [int((~keep).sum()) for keep in inside]
-    t = np.concatenate([np.empty(0)] + [a.times[keep] for a, keep in zip(aiding, inside, strict=True)])
+    unused = [int(np.sum(~keep)) for keep in inside]
+    pairs = list(zip(aiding, inside, strict=True))
+    t = np.concatenate([np.empty(0)] + [a.times[keep] for a, keep in pairs])
     order = np.argsort(t, kind="stable")
 
-    def joined(name: str) -> Array:
-        parts = [getattr(a, name)[keep] for a, keep in zip(aiding, inside, strict=True)]
-        return np.concatenate([np.empty((0, 3)), *parts])[order]
+    def joined(parts: list[Array], tail: tuple[int, ...] = (3,)) -> Array:
+        return np.ascontiguousarray(np.concatenate([np.empty((0, *tail)), *parts])[order], float)
 
-    kind = np.repeat(np.array([a.kind for a in aiding], np.int64), counts)[order]
-    source = np.repeat(np.arange(len(aiding)), counts)[order]
+    kind = joined([np.full(int(keep.sum()), a.kind, float) for a, keep in pairs], ()).astype(np.int64)
+    source = joined([np.full(int(k.sum()), i, float) for i, (_, k) in enumerate(pairs)], ()).astype(np.int64)
     sizes = np.array([0 if a.gauss_markov is None else 3 for a in aiding] + [0])
     states = np.where(sizes > 0, first + np.cumsum(sizes) - sizes, -1).astype(np.int64)
     measured = Measurements(
-        np.searchsorted(line.times, t[order]).astype(np.int64), kind, joined("value"), joined("variance"),
-        joined("lever"), states[source],
+        np.searchsorted(line.times, t[order]).astype(np.int64), kind, joined([a.value[k] for a, k in pairs]),
+        joined([a.variance[k] for a, k in pairs]), joined([a.lever[k] for a, k in pairs]), states[source],
     )  # fmt: skip
     return measured, source, unused
 

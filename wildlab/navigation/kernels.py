@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.geometry.compilation import compiled
-from wildlab.geometry.frames import Array, Earth
+from wildlab.geometry.frames import Array
 
 if TYPE_CHECKING:
     from wildlab.navigation.strapdown import Measurements, Timeline
@@ -66,30 +66,29 @@ def skew(a: Array) -> Array:
 
 
 @compiled
-def strapdown_step(x: Array, f: Array, w: Array, dt: float, earth: Earth) -> tuple[Array, Array, Array]:
+def strapdown_step(x: Array, f: Array, w: Array, dt: float, earth: Array) -> tuple[Array, Array, Array]:
     """One step of the state x (16,): position, velocity, quaternion, accelerometer bias, gyro bias.
 
     f, w are the mean of the measurements over the step. Besides the state after it, the attitude half-way
     and the specific force in n.
     """
-    rate = np.array(earth.rate)
     # The Earth turns n the other way.
-    turn, back = exponential((w - x[13:16]) * (dt / 2)), exponential(rate * (-dt / 2))
+    turn, back = exponential((w - x[13:16]) * (dt / 2)), exponential(earth[3:6] * (-dt / 2))
     half = multiply(multiply(back, x[6:10]), turn)
     R_mid = rotation_of(half)
     f_n = R_mid @ (f - x[10:13])
     p, v = x[:3], x[3:6]
-    g = earth.gravity + earth.gradient * p[2]  # down is positive, and gravity grows downwards
-    attraction = g * np.array((-earth.curvature * p[0], -earth.curvature * p[1], 1.0))
+    g = earth[0] + earth[1] * p[2]  # down is positive, and gravity grows downwards
+    attraction = g * np.array((-earth[2] * p[0], -earth[2] * p[1], 1.0))
     after = x.copy()
-    after[3:6] = v + dt * (f_n + attraction - 2 * (skew(rate) @ v))
+    after[3:6] = v + dt * (f_n + attraction - 2 * (skew(earth[3:6]) @ v))
     after[:3] = p + dt / 2 * (v + after[3:6])
     after[6:10] = multiply(multiply(back, half), turn)
     return after, R_mid, f_n
 
 
 @compiled
-def integrate(times: Array, f: Array, w: Array, earth: Earth, start: Array) -> Array:
+def integrate(times: Array, f: Array, w: Array, earth: Array, start: Array) -> Array:
     """Strapdown from the first row on, (N, 16)."""
     out = np.empty((len(times), 16))
     out[0] = start
@@ -101,7 +100,7 @@ def integrate(times: Array, f: Array, w: Array, earth: Earth, start: Array) -> A
 
 @compiled
 def transition(
-    x: Array, f: Array, w: Array, dt: float, earth: Earth, axes: bool, count: int
+    x: Array, f: Array, w: Array, dt: float, earth: Array, axes: bool, count: int
 ) -> tuple[Array, Array]:
     """The state after a step, and how all errors before it make the first nine after it, (9, count).
 
@@ -184,7 +183,7 @@ def correct(x: Array, P: Array, H: Array, y: Array, R: Array, axes: bool) -> tup
 
 @compiled
 def mekf(
-    line: Timeline, measured: Measurements, earth: Earth, noise: Array, slow: Array, x: Array, P: Array,
+    line: Timeline, measured: Measurements, earth: Array, noise: Array, slow: Array, x: Array, P: Array,
     axes: bool, gate: float, patience: float, rows: int,
 ) -> tuple[Array, Array, Array, Array, Array, Integers]:  # fmt: skip
     """The whole filter over a timeline: states and covariances of so many rows, and of each measurement the

@@ -230,7 +230,7 @@ def run_mekf(
     ]
     slow = np.concatenate([np.repeat(biases, 3, axis=0), extra])
     states, covariances, innovation, S, nis, verdict = kernels.mekf(
-        line, measured, earth, np.array([*noise[:2], *outages[2:]]), slow,
+        line, measured, earth.as_array(), np.array([*noise[:2], *outages[2:]]), slow,
         np.concatenate([start.state, np.zeros(len(extra))]), block_diag(start.covariance, beyond),
         axes is not None, gate_threshold(gate_probability, 3), float(outages.patience), len(times),
     )  # fmt: skip

@@ -285,5 +285,5 @@ def integrate_strapdown(
     )
     states = np.full((len(samples.times), 16), np.nan)
     t, f, w = (part[:n] for part in samples)
-    states[:n] = kernels.integrate(t, f, w, earth, start)
+    states[:n] = kernels.integrate(t, f, w, earth.as_array(), start)
     return DeadReckoning(samples.times, states[:, :3], states[:, 3:6], states[:, 6:10], gaps)

@@ -423,13 +423,13 @@ def _each(group: str, part: Strict) -> Iterator[tuple[str, str, Parameter]]:
             yield from _each(f"{group}.{name}", value)
 
 
-def parameters_table(twin: TwinParameters) -> pd.DataFrame:
+def parameters_table(twin: TwinParameters | str | Path) -> pd.DataFrame:
     """Every parameter of a twin, for a report.
 
     Parameters
     ----------
     twin
-        Its parameters.
+        Its parameters, or its name or file as for :func:`load_twin`.
 
     Returns
     -------
@@ -443,6 +443,7 @@ def parameters_table(twin: TwinParameters) -> pd.DataFrame:
     WildlabError
         As :func:`load_twin`, where it is given a name or a file.
     """
+    parameters = twin if isinstance(twin, TwinParameters) else load_twin(twin)
     return pd.DataFrame(
         [
             {
@@ -452,7 +453,7 @@ def parameters_table(twin: TwinParameters) -> pd.DataFrame:
                 "status": p.status,
                 "because": p.because,
             }
-            for group, name, p in each_parameter(twin)
+            for group, name, p in each_parameter(parameters)
         ],
         columns=["parameter", "value", "unit", "status", "because"],
     )
@@ -480,13 +481,13 @@ def status_words(table: pd.DataFrame) -> str:
     return f"{len(table)} parameters: {', '.join(said)}"
 
 
-def fitted_to(twin: TwinParameters) -> tuple[str, ...]:
+def fitted_to(twin: TwinParameters | str | Path) -> tuple[str, ...]:
     """The published tables that any parameter of a twin was fitted to, sorted: they do not test the twin.
 
     Parameters
     ----------
     twin
-        Its parameters.
+        Its parameters, or its name or file as for :func:`load_twin`.
 
     Returns
     -------
@@ -498,7 +499,8 @@ def fitted_to(twin: TwinParameters) -> tuple[str, ...]:
     WildlabError
         As :func:`load_twin`, where it is given a name or a file.
     """
-    return tuple(sorted({table for *_, p in each_parameter(twin) for table in p.fitted_to}))
+    parameters = twin if isinstance(twin, TwinParameters) else load_twin(twin)
+    return tuple(sorted({table for *_, p in each_parameter(parameters) for table in p.fitted_to}))
 
 
 #: What filters are told of a twin's sensors: their tuning, not the flight.

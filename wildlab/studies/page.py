@@ -545,12 +545,11 @@ def show_twins(report: Report, twins: Sequence[str], study: str) -> None:
     """
     report.section("What was simulated")
     for twin in twins:
-        loaded = load_twin(twin)
-        table = parameters_table(loaded)
+        table = parameters_table(twin)
         report.table(
             table,
             fold=f"The twin {twin}: {status_words(table)}",
-            caption=f"Every parameter of the twin. {fit_words(load_published(study), loaded)}",
+            caption=f"Every parameter of the twin. {fit_words(load_published(study), load_twin(twin))}",
         )
 
 
