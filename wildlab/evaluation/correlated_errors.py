@@ -165,7 +165,7 @@ class Covariance:
     def __init__(self, points: PosePoints, noise: WanderNoise, places: Places | None = None) -> None:
         when, image = np.unique(points.time, return_inverse=True)
         self._order = np.argsort(image, kind="stable")
-        self._first = 2 * np.searchsorted(image[self._order], np.arange(len(when) + 1))
+        self._image = image[self._order]
         sd = np.array([noise.sd[kind] for kind, axes in KINDS.items() for _ in axes])
         G, lasts = points.derivatives * sd, np.take(noise.lasts, _LASTS)
         self._places = None
@@ -174,9 +174,8 @@ class Covariance:
             G = np.concatenate([G, moving], axis=2)
             lasts = np.append(lasts, np.full(moving.shape[2], noise.lasts[0]))
             self._places = still, np.isfinite(places.sd).all() * np.eye(still.shape[2])
-        own = (points.own + noise.sd["pixel"] ** 2 * points.pixel)[self._order]
-        self._factor = np.linalg.cholesky(own)
-        self._g = np.linalg.solve(self._factor, G[self._order]).reshape(-1, G.shape[2])
+        self._G = np.ascontiguousarray(G[self._order])
+        self._own = (points.own + noise.sd["pixel"] ** 2 * points.pixel)[self._order]
         self._rho = np.minimum(np.exp(-np.diff(when)[:, None] / lasts), 1 - 1e-6)
         self._share = np.where(np.arange(len(lasts)) < len(_LASTS), noise.share, 1.0)
 
@@ -205,10 +204,10 @@ class Covariance:
 
     def _weigh(self, B: Array) -> tuple[Array, float]:
         """The same with places that are known."""
-        W = np.linalg.solve(self._factor, B[self._order]).reshape(-1, B.shape[-1])
-        explained, logarithm = explained_by_images(self._g, W, self._first, self._rho, self._share)
-        own = 2 * np.log(np.diagonal(self._factor, axis1=1, axis2=2)).sum()
-        return np.asarray(W.T @ W - explained), float(logarithm + own)
+        columns = np.ascontiguousarray(B[self._order])
+        W, T, logarithm = weigh_chain(self._G, self._own, columns, self._image, self._rho, self._share)
+        W, T = W.reshape(-1, B.shape[-1]), T.reshape(-1, B.shape[-1])
+        return np.asarray(W.T @ W - T.T @ T), logarithm
 
 
 class LinearFit(NamedTuple):
@@ -355,20 +354,58 @@ def _second_derivatives(function: Callable[[Array], float], x: Array, h: float =
 
 
 @compiled
-def explained_by_images(
-    g: Array, W: Array, first: NDArray[np.intp], rho: Array, share: Array
-) -> tuple[Array, float]:
-    """What errors of images take from the products ``W'W`` of whitened columns.
+def _factorise(A: Array) -> float:
+    """Replace the lower half of A (n, n) by that of its Cholesky factor; the logarithm of the determinant."""
+    n, logarithm = A.shape[0], 0.0
+    for j in range(n):
+        for i in range(j, n):
+            value = A[i, j]
+            for k in range(j):
+                value -= A[i, k] * A[j, k]
+            A[i, j] = np.sqrt(value) if i == j else value / A[j, j]
+        logarithm += 2 * np.log(A[j, j])
+    return logarithm
+
+
+@compiled
+def _forward(L: Array, B: Array) -> None:
+    """Replace B (n, K) by the inverse of the lower factor L (n, n) times B."""
+    for i in range(L.shape[0]):
+        for k in range(i):
+            for c in range(B.shape[1]):
+                B[i, c] -= L[i, k] * B[k, c]
+        for c in range(B.shape[1]):
+            B[i, c] /= L[i, i]
+
+
+@compiled
+def _backward(L: Array, B: Array) -> None:
+    """Replace B (n, K) by the inverse of the transposed lower factor times B."""
+    for i in range(L.shape[0] - 1, -1, -1):
+        for k in range(i + 1, L.shape[0]):
+            for c in range(B.shape[1]):
+                B[i, c] -= L[k, i] * B[k, c]
+        for c in range(B.shape[1]):
+            B[i, c] /= L[i, i]
+
+
+@compiled
+def weigh_chain(
+    G: Array, own: Array, B: Array, image: NDArray[np.int64], rho: Array, share: Array
+) -> tuple[Array, Array, float]:
+    """What the weighed products of B need: with W (N, 2, K) and T (M, 2 D, K) they are ``W'W - T'T``.
 
     Parameters
     ----------
-    g
-        (2 N, D) of each coordinate of a point, whitened, by D errors of its image, each in its own standard
-        deviation. Points are in the order of their images.
-    W
-        (2 N, K).
-    first
-        (M + 1,) row at which each of M images begins, and the end.
+    G
+        (N, 2, D) of each point by D errors of its image, each in its own standard deviation. Points are in
+        the order of their images.
+    own
+        (N, 2, 2) covariance of what is each point's own.
+    B
+        (N, 2, K).
+    image
+        (N,) number of the image, from 0 to M - 1, none left out.
     rho
         (M - 1, D) correlation of what wanders from one image to the next, below 1.
     share
@@ -376,33 +413,76 @@ def explained_by_images(
 
     Returns
     -------
-    (K, K), logarithm of the determinant of the covariance of whitened errors
+    W, T, logarithm of the determinant of the covariance
     """
-    M, D, K = len(first) - 1, g.shape[1], W.shape[1]
-    explained, logarithm = np.zeros((K, K)), 0.0
-    wanders, stays = np.sqrt(share).reshape(-1, 1), np.sqrt(1 - share).reshape(-1, 1)
-    before, carried = np.zeros((D, D)), np.zeros((D, K))
+    N, K, M, D = B.shape[0], B.shape[2], rho.shape[0] + 1, G.shape[2]
+    W, T = np.empty((N, 2, K)), np.zeros((M, 2 * D, K))
+    information = np.zeros((M, D, D))
+    g0, g1 = np.empty(D), np.empty(D)
+    logarithm = 0.0
+    for i in range(N):
+        a = np.sqrt(own[i, 0, 0])
+        b = own[i, 1, 0] / a
+        d = np.sqrt(own[i, 1, 1] - b * b)
+        logarithm += 2 * np.log(a * d)
+        m = image[i]
+        for j in range(D):
+            g0[j] = G[i, 0, j] / a
+            g1[j] = (G[i, 1, j] - b * g0[j]) / d
+        for c in range(K):
+            W[i, 0, c] = B[i, 0, c] / a
+            W[i, 1, c] = (B[i, 1, c] - b * W[i, 0, c]) / d
+        for j in range(D):
+            if g0[j] == 0.0 and g1[j] == 0.0:
+                continue
+            for k in range(D):
+                information[m, j, k] += g0[j] * g0[k] + g1[j] * g1[k]
+            for c in range(K):
+                T[m, j, c] += g0[j] * W[i, 0, c] + g1[j] * W[i, 1, c]
+    # Each image's own part first: what is left over of its points then says something of what wanders.
+    wanders, stays = np.sqrt(share), np.sqrt(1 - share)
+    A, across, left, before = np.empty((D, D)), np.empty((D, D)), np.empty((D, D)), np.zeros((D, D))
+    seen, carried = np.empty((D, K)), np.zeros((D, K))
     for m in range(M):
-        part = g[first[m] : first[m + 1]]
-        information, seen = part.T @ part, part.T @ W[first[m] : first[m + 1]]
-        # Each image's own part first: what is left over of its points then says something of what wanders.
-        A = np.eye(D) + stays * information * stays.T
-        own, across = np.linalg.solve(A, stays * seen), np.linalg.solve(A, stays * information)
-        explained += seen.T @ (stays * own)
-        left = wanders * (information - information @ (stays * across)) * wanders.T
-        rest = wanders * (seen - information @ (stays * own))
-        if m > 0:
-            lost = 1 - rho[m - 1] ** 2
-            q = (rho[m - 1] / lost).reshape(-1, 1)
-            logarithm += np.log(lost).sum()
-            left += np.diag(1 / lost) - q * before * q.T
-            rest += q * carried
-        else:
-            left += np.eye(D)
-        if m < M - 1:
-            left += np.diag(rho[m] ** 2 / (1 - rho[m] ** 2))
-        before = np.linalg.inv(left)
-        carried = before @ rest
-        explained += rest.T @ carried
-        logarithm += np.linalg.slogdet(A)[1] + np.linalg.slogdet(left)[1]
-    return explained, logarithm
+        for j in range(D):
+            for k in range(D):
+                across[j, k] = stays[j] * information[m, j, k]
+                A[j, k] = across[j, k] * stays[k]
+            A[j, j] += 1.0
+            for c in range(K):
+                seen[j, c] = stays[j] * T[m, j, c]
+        logarithm += _factorise(A)
+        _forward(A, across)
+        _forward(A, seen)
+        for j in range(D):
+            for k in range(j + 1):
+                value = information[m, j, k]
+                for i in range(D):
+                    value -= across[i, j] * across[i, k]
+                left[j, k] = wanders[j] * wanders[k] * value
+                left[k, j] = left[j, k]
+            for c in range(K):
+                rest = T[m, j, c]
+                for i in range(D):
+                    rest -= across[i, j] * seen[i, c]
+                T[m, D + j, c] = wanders[j] * rest
+        T[m, :D] = seen
+        for j in range(D):
+            come = 1 / (1 - rho[m - 1, j] ** 2) if m > 0 else 1.0
+            go = rho[m, j] ** 2 / (1 - rho[m, j] ** 2) if m < M - 1 else 0.0
+            left[j, j] += come + go
+            if m > 0:
+                q = rho[m - 1, j] / (1 - rho[m - 1, j] ** 2)
+                logarithm += np.log(1 - rho[m - 1, j] ** 2)
+                for k in range(D):
+                    left[j, k] -= q * before[j, k] * rho[m - 1, k] / (1 - rho[m - 1, k] ** 2)
+                for c in range(K):
+                    T[m, D + j, c] += q * carried[j, c]
+        logarithm += _factorise(left)
+        _forward(left, T[m, D:])
+        carried[:] = T[m, D:]
+        _backward(left, carried)
+        before[:] = np.eye(D)
+        _forward(left, before)
+        _backward(left, before)
+    return W, T, logarithm
