@@ -17,6 +17,7 @@ from benchmarks import (
     navigation,
     particles,
     pixel_to_plane,
+    simulation,
     terrain,
     tracking,
     warm,
@@ -24,7 +25,7 @@ from benchmarks import (
 
 BASELINE = Path(__file__).with_name("baseline.json")
 EVERY = (
-    *(pixel_to_plane, terrain, navigation, tracking, many, particles, warm, floating),
+    *(pixel_to_plane, terrain, navigation, tracking, many, particles, simulation, warm, floating),
     long_flight,
 )
 

@@ -17,9 +17,9 @@ from wildlab.geometry.camera_poses import CameraPoses, Mount
 from wildlab.geometry.covariances import inside_ellipse
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import georeference_pixels
+from wildlab.simulation.camera_detections import moments
 from wildlab.simulation.scene.flights import CameraResponse, expose, sensor_of
 from wildlab.simulation.scene.render import Scene, Sea, render, vessel
-from wildlab.simulation.twins import moments
 
 CAMERA = Camera(640, 512, 1159.2, 1167.8, 313.0, 265.0)
 #: Of all such scenes, whose share of these 90 % ellipses is known with an interval of 99 %.

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from tests.navigation.flights import GNSS_SD, GRAVITY, LEVERS, NOISE, begin, fixes, fly, spoil
+from tests.navigation import reference_mekf
+from tests.navigation.flights import GNSS_SD, GRAVITY, LEVERS, NOISE, begin, fixes, fly, moved, spoil
 from tests.navigation.test_mekf import (
     EARTH,
     between,
@@ -12,11 +13,10 @@ from tests.navigation.test_mekf import (
     some_state,
     spoilt,
 )
-from wildlab.geometry.frames import flat_earth, rotation_vector_to_matrix
-from wildlab.navigation import kernels
-from wildlab.navigation.aiding import positions
-from wildlab.navigation.mekf import run_mekf
-from wildlab.navigation.strapdown import AxisErrors
+from wildlab.geometry.frames import flat_earth, local_earth, rotation_vector_to_matrix
+from wildlab.navigation.aiding import GaussMarkov, positions, velocities
+from wildlab.navigation.mekf import Outages, prepare, run_mekf
+from wildlab.navigation.strapdown import AxisErrors, ImuSamples
 from wildlab.simulation.error_models import gauss_markov
 from wildlab.simulation.onboard_sensors import misaligned_triad
 
@@ -24,6 +24,38 @@ from wildlab.simulation.onboard_sensors import misaligned_triad
 @pytest.fixture(scope="module")
 def flight():
     return fly()
+
+
+@pytest.mark.slow
+def test_compiled_and_reference_agree_on_axes_and_gauss_markov_errors(flight):
+    """With every state beyond the fifteen, a gap, and one antenna of two with a Gauss-Markov error."""
+    imu, start, antennas, _ = spoilt(flight, 0, every=50)
+    keep = (imu.times < 30) & ~((imu.times > 20.0) & (imu.times < 21.3))
+    imu = ImuSamples(*(part[keep] for part in imu))
+    correlated = antennas[1]._replace(gauss_markov=GaussMarkov(np.array([0.1, 0.2, 0.3]), 15.0))
+    seconds = np.arange(1.0, 29)
+    moving = velocities(seconds, moved(seconds)[0], 0.5)
+    moving = moving._replace(gauss_markov=GaussMarkov(np.array([0.2, 0.2, 0.4]), 3.0))
+    aiding = [antennas[0], correlated, moving]
+    axes, earth = AxisErrors(0.01, 0.003, 0.005), local_earth(0.9, 100.0)
+    wanted = np.arange(0.5, 29.5, 1.0)
+    found = run_mekf(imu, start, NOISE, earth, aiding, wanted, axes=axes)
+    ready = prepare(imu, start, NOISE, aiding, wanted, 0.9999, Outages(), axes)
+    beyond = 18 + 3 + 3
+    assert ready.covariance.shape == (15 + beyond, 15 + beyond)
+    states, covariances, nis, verdicts = reference_mekf.mekf(ready, earth.as_array(), 5.0)
+    known = np.isfinite(found.position).all(axis=1)
+    ours = np.hstack(
+        [found.position, found.velocity, found.quaternion, found.accelerometer_bias, found.gyro_bias]
+    )
+    assert np.abs(ours - states[:, :16])[known].max() < 1e-8
+    theirs = covariances[:, :15, :15]
+    scale = np.sqrt(np.einsum("kii,kjj->kij", theirs, theirs))
+    assert (np.abs(found.covariance - theirs) / scale)[known].max() < 1e-7
+    assert np.allclose(found.innovations.nis, nis, rtol=1e-6)
+    assert np.array_equal(found.innovations.verdict, verdicts)
+    without = run_mekf(imu, start, NOISE, earth, [antennas[0]], wanted)
+    assert np.abs(without.covariance - found.covariance)[known].max() > 0
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -37,14 +69,14 @@ def test_transition_with_axes_is_the_derivative_of_a_step(seed):
         # What there is, where that much of the reading came of the axes.
         E = errors.reshape(2, 3, 3)
         there = f - E[0] @ (f - x[10:13]), w - E[1] @ (w - x[13:16])
-        return kernels.strapdown_step(x, *there, dt, earth)[0]
+        return reference_mekf.strapdown_step(x, *there, dt, earth)[0]
 
     after = step(np.zeros(18))
     found = np.stack(
         [(between(after, step(h)) - between(after, step(-h))) / 2e-4 for h in 1e-4 * np.eye(18)], -1
     )
-    _, Phi = kernels.transition(x, f, w, dt, earth, True, 33)
-    assert np.abs(found - np.vstack([Phi[:, 15:], np.zeros((6, 18))])).max() < 2 * dt * dt
+    Phi = reference_mekf.transition(np.concatenate([x, np.zeros(18)]), f, w, dt, earth, (1.0, 1.0), axes=True)
+    assert np.abs(found - Phi[:15, 15:]).max() < 2 * dt * dt
     assert np.abs(Phi[3:9, 15:]).max() > 0.02
 
 

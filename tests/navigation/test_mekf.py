@@ -1,25 +1,33 @@
-"""The MEKF against finite differences, and against its own claims."""
+"""The MEKF against its plain version, against finite differences, and against its own claims."""
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from tests.navigation import reference_mekf
 from tests.navigation.flights import (
+    GNSS_SD,
     GRAVITY,
+    LEVERS,
     NOISE,
+    START_SD,
     begin,
     fixes,
     fly,
+    moved,
     spoil,
 )  # fmt: skip
-from wildlab.geometry.frames import flat_earth, matrix_to_rotation_vector, quaternion_to_matrix
+from wildlab.geometry.frames import flat_earth, local_earth, matrix_to_rotation_vector, quaternion_to_matrix
 from wildlab.navigation import kernels
+from wildlab.navigation.aiding import positions, standstill, velocities
 from wildlab.navigation.mekf import (
     ACCEPTED,
     FORCED,
     REJECTED,
+    InitialState,
     Outages,
     pose_covariance,
+    prepare,
     run_mekf,
 )  # fmt: skip
 from wildlab.navigation.strapdown import ImuNoise, ImuSamples
@@ -59,12 +67,12 @@ def test_transition_is_the_derivative_of_a_step(seed):
     rng = np.random.default_rng(seed)
     x, f, w = some_state(rng), rng.uniform(-15, 15, 3), rng.uniform(-1, 1, 3)
     earth, dt = flat_earth(GRAVITY).as_array(), 0.01
-    after, first_nine = kernels.transition(x, f, w, dt, earth, False, 15)
+    after = reference_mekf.strapdown_step(x, f, w, dt, earth)[0]
     found = differences(
-        lambda e: between(after, kernels.strapdown_step(shifted(x, e), f, w, dt, earth)[0]),
+        lambda e: between(after, reference_mekf.strapdown_step(shifted(x, e), f, w, dt, earth)[0]),
         np.full(15, 1e-4),
     )
-    Phi = np.vstack([first_nine, np.eye(15)[9:]])
+    Phi = reference_mekf.transition(x, f, w, dt, earth, (1.0, 1.0))
     # What a gyro bias does within one step is taken to first order of the angle turned in it.
     assert np.abs(found - Phi)[:, :12].max() < 1e-7
     assert np.abs(found - Phi)[:, 12:].max() < 2 * dt * dt
@@ -76,12 +84,16 @@ def test_transition_is_the_derivative_of_a_step(seed):
 def test_measurement_jacobians_are_derivatives_of_the_innovation(kind, seed):
     rng = np.random.default_rng(seed)
     x, w, value, lever = some_state(rng), rng.uniform(-1, 1, 3), rng.uniform(-1, 1, 3), rng.uniform(-2, 2, 3)
-    _, H = kernels.predict_measurement(kind, x, w, value, lever, 15)
+    y, H = reference_mekf.predict_measurement(kind, x, w, value, lever)
     found = differences(
-        lambda e: -kernels.predict_measurement(kind, shifted(x, e), w, value, lever, 15)[0],
+        lambda e: -reference_mekf.predict_measurement(kind, shifted(x, e), w, value, lever)[0],
         np.full(15, 1e-4),
     )
     assert np.abs(found - H).max() < 1e-6
+    compiled_y, compiled_H = np.zeros(3), np.zeros((3, 15))
+    kernels.predict_measurement(kind, x, w, value, lever, np.empty((3, 3)), compiled_y, compiled_H)
+    assert np.abs(compiled_y - y).max() < 1e-12
+    assert np.abs(compiled_H - H).max() < 1e-12
 
 
 @pytest.fixture(scope="module")
@@ -93,6 +105,41 @@ def spoilt(flight, seed, **options):
     rng = np.random.default_rng(seed)
     imu, biases = spoil(flight, rng)
     return imu, begin(flight, biases, rng), fixes(flight, rng, **options), biases
+
+
+@pytest.mark.slow
+def test_compiled_and_plain_agree(flight):
+    """With every kind of measurement, a gap, an outage that the gate must forgive, and the turning Earth."""
+    imu, start, antennas, _ = spoilt(flight, 0, every=50)
+    short = imu.times < 40
+    keep = short & ~((imu.times > 20.0) & (imu.times < 21.3))
+    imu = ImuSamples(*(part[keep] for part in imu))
+    rng = np.random.default_rng(1)
+    t = np.arange(1.0, 39, 0.7)
+    later = np.where(antennas[0].times > 30, 2.0, 0)[:, None]
+    jumped = [antenna._replace(value=antenna.value + later) for antenna in antennas]
+    aiding = [
+        *jumped,
+        velocities(t, moved(t - 0.1)[0], 0.5, LEVERS[0], latency=0.1),
+        standstill([3.0, 7.0], 30.0),
+    ]
+    earth = local_earth(0.9, 100.0)
+    wanted = np.sort(np.concatenate([[12.3456, 20.5], rng.uniform(0, 39, 40)]))
+    outages = Outages(patience=3.0)
+    found = run_mekf(imu, start, NOISE, earth, aiding, wanted, outages=outages)
+    ready = prepare(imu, start, NOISE, aiding, wanted, 0.9999, outages)
+    states, covariances, nis, verdicts = reference_mekf.mekf(ready, earth.as_array(), 3.0)
+    known = np.isfinite(found.position).all(axis=1)
+    assert known.sum() > 30
+    assert not known[np.searchsorted(wanted, 20.5)]
+    biases = [found.accelerometer_bias, found.gyro_bias]
+    ours = np.hstack([found.position, found.velocity, found.quaternion, *biases])
+    assert np.abs(ours - states)[known].max() < 1e-9
+    scale = np.sqrt(np.einsum("kii,kjj->kij", covariances, covariances))
+    assert (np.abs(found.covariance - covariances) / scale)[known].max() < 1e-9
+    assert np.allclose(found.innovations.nis, nis, rtol=1e-7)
+    assert np.array_equal(found.innovations.verdict, verdicts)
+    assert {REJECTED, ACCEPTED, FORCED} == set(verdicts)
 
 
 def errors_of(found, motion, rows):
@@ -181,6 +228,20 @@ def test_a_gap_is_said_and_crossed_with_doubt(flight):
     assert (np.abs(errors) < 5 * spread).all()
 
 
+def test_latency_puts_a_fix_where_it_belongs(flight):
+    imu, start, antennas, _ = spoilt(flight, 8)
+    late = [a._replace(times=a.times + 0.25) for a in antennas]
+    again = [
+        positions(a.times, a.value, GNSS_SD, lever, latency=0.25)
+        for a, lever in zip(late, LEVERS, strict=True)
+    ]
+    wanted = flight.imu.times[8000::50]
+    known = run_mekf(imu, start, NOISE, EARTH, again, wanted)
+    assert np.abs(known.position - flight.motion.position[8000::50]).max() < 0.1
+    ignored = run_mekf(imu, start, NOISE, EARTH, late, wanted, gate_probability=1.0)
+    assert np.median(np.linalg.norm(ignored.position - flight.motion.position[8000::50], axis=1)) > 3.0
+
+
 def test_wanted_times_may_repeat_lie_outside_or_be_unknown(flight):
     imu, start, antennas, _ = spoilt(flight, 12)
     wanted = np.array([50.0, np.nan, 10.0, 50.0, -3.0, 1000.0])
@@ -217,20 +278,43 @@ def test_consistent_over_fifty_flights(flight):
     assert np.mean(nis) == pytest.approx(1.0, abs=0.03)
 
 
+def test_standing_still_holds_the_velocity():
+    times = np.arange(0, 60, 0.02)
+    rng = np.random.default_rng(11)
+    imu = ImuSamples(
+        times,
+        np.array([0, 0, -GRAVITY]) + 0.02 * rng.standard_normal((len(times), 3)),
+        0.001 * rng.standard_normal((len(times), 3)),
+    )
+    start = InitialState(0.0, np.concatenate([np.zeros(6), [1.0], np.zeros(9)]), np.diag(START_SD**2))
+    held = run_mekf(imu, start, NOISE, EARTH, [standstill(np.arange(1, 60, 1.0), 0.01)], [59.9])
+    free = run_mekf(imu, start, NOISE, EARTH, [], [59.9])
+    assert np.abs(held.velocity).max() < 0.02
+    assert np.sqrt(held.covariance[0, 3, 3]) < 0.02 < np.sqrt(free.covariance[0, 3, 3])
+
+
 @pytest.mark.parametrize("seed", range(6))
-def test_a_correction_adds_the_information_of_the_measurement(seed):
-    """Random covariances and measurements; errors of the axes are considered, not estimated."""
+def test_a_correction_is_the_plain_one(seed):
+    """Random covariances and measurements, with and without errors of the axes."""
     rng = np.random.default_rng(seed)
-    n = kernels.N_ERRORS + kernels.N_AXES
+    axes = bool(seed % 2)
+    n = kernels.N_ERRORS + axes * kernels.N_AXES + 3 * (seed % 3)
     A = rng.normal(size=(n, n))
-    P, x, H = A @ A.T / n + 1e-3 * np.eye(n), rng.normal(size=n + 1), rng.normal(size=(3, n))
+    P, x, H, y = A @ A.T / n + 1e-3 * np.eye(n), rng.normal(size=n + 1), np.zeros((3, n)), np.zeros(3)
     x[6:10] /= np.linalg.norm(x[6:10])
-    R = np.diag(rng.uniform(0.1, 2.0, 3))
-    after, known = kernels.correct(x, P, H, np.zeros(3), R, False)
-    assert np.allclose(after, x, rtol=0, atol=1e-15)
-    assert np.allclose(np.linalg.inv(known), np.linalg.inv(P) + H.T @ np.linalg.inv(R) @ H, rtol=1e-7)
-    after, considered = kernels.correct(x, P, H, rng.normal(size=3), R, True)
-    assert np.array_equal(after[16:], x[16:])
-    assert np.allclose(considered[15:, 15:], P[15:, 15:], rtol=1e-12)
-    assert np.trace(known) < np.trace(considered) < np.trace(P)
-    assert np.array_equal(considered, considered.T)
+    columns = rng.choice(n, rng.integers(1, n + 1), replace=False)
+    H[:, columns], y[:] = rng.normal(size=(3, len(columns))), 0.3 * rng.normal(size=3)
+    R = rng.uniform(0.1, 2.0, 3)
+    expected, covariance = reference_mekf.correct(x.copy(), P.copy(), H, y, np.diag(R), axes)
+    used = kernels.columns_of(H)
+    assert sorted(used) == sorted(columns)
+    HP, inverse = H @ P, np.full((3, 3), np.nan)
+    kernels.invert(H @ HP.T + np.diag(R), inverse)
+    K, M, work = np.full((3, n), np.nan), np.full((n, n), np.nan), np.full((3, 4), np.nan)
+    kernels.correct(x, P, H, used, y, R, axes, inverse, HP, K, M, work)
+    x[6:10] *= np.sign(x[6:10] @ expected[6:10])
+    assert np.allclose(x, expected, rtol=1e-10, atol=1e-12)
+    assert np.allclose(P, covariance, rtol=1e-10, atol=1e-11) and np.array_equal(P, P.T)
+    if axes:
+        dense = slice(kernels.N_ERRORS, kernels.N_ERRORS + kernels.N_AXES)
+        assert np.array_equal(K[:, dense], np.zeros((3, kernels.N_AXES))), "considered, not estimated"

@@ -1,8 +1,9 @@
-"""The nonlinear observer against flights that are known."""
+"""The nonlinear observer against its plain version, and against flights that are known."""
 
 import numpy as np
 import pytest
 
+from tests.navigation import reference_observer
 from tests.navigation.flights import LEVERS, NOISE, attitude, begin, fixes, fly, moved, spoil
 from wildlab.geometry.frames import (
     geodetic_to_ecef,
@@ -20,7 +21,7 @@ from wildlab.navigation.observer import (
     course_reference,
     earth_axes,
     field_reference,
-    gravity_at,
+    prepare,
     run_observer,
 )
 from wildlab.navigation.strapdown import ImuSamples
@@ -63,29 +64,35 @@ def attitude_errors(found, motion, rows):
 
 def test_gravity_in_ecef_is_normal_gravity():
     for latitude, height in ((0.0, 0.0), (0.7, 0.0), (1.1, 500.0), (np.pi / 2, 100.0)):
-        g = gravity_at(geodetic_to_ecef(latitude, 0.3, height))
+        g = reference_observer.gravity_at(geodetic_to_ecef(latitude, 0.3, height))
         assert np.linalg.norm(g) == pytest.approx(normal_gravity(latitude, height), abs=2e-4)
         _, R_en = earth_axes((latitude, 0.3, height))
         assert g @ R_en[:, 2] == pytest.approx(np.linalg.norm(g), rel=1e-9)
 
 
-def test_a_gap_velocities_and_a_tight_bound_on_the_bias(flight, theta=1.7):
+def test_compiled_and_plain_agree(flight, theta=1.7):
     imu, start, antennas, reference, _ = spoilt(flight, 0)
     keep = (imu.times < 30) & ~((imu.times > 15) & (imu.times < 16.2))
     imu = ImuSamples(*(part[keep] for part in imu))
     t = np.arange(0.3, 29, 0.9)
     aiding = [*antennas, reference, velocities(t, moved(t)[0], 0.3, LEVERS[1])]
+    # A tight bound, so that the projection has something to do.
     gains = Gains(theta=theta, bias_bound=3e-4, k_i=0.05)
     wanted = np.array([0.0, 3.3, 9.87, 14.0, 15.5, 20.0, 28.9])
     found = run_observer(imu, start, ORIGIN, aiding, wanted, gains=gains)
+    ready = prepare(imu, start, ORIGIN, aiding, gains, wanted, 0.1)
+    rows = reference_observer.observer(ready)
+    p_e, R_en = earth_axes(ORIGIN)
     known = np.isfinite(found.position).all(axis=1)
     assert known.tolist() == [True, True, True, True, False, True, True]
     assert len(found.gaps) == 1
-    rows = np.searchsorted(flight.imu.times, wanted[known] - 1e-9)
-    late = rows > 0  # it begins where the start is wrong
-    assert np.abs(found.position[known] - flight.motion.position[rows])[late].max() < 0.1
-    assert np.abs(found.velocity[known] - flight.motion.velocity[rows])[late].max() < 0.5
-    assert 2.5e-4 < np.linalg.norm(found.gyro_bias[known], axis=1).max() < 1.3 * gains.bias_bound
+    # Positions in e have seven digits before the point.
+    assert np.abs(found.position - (rows[:, 7:10] - p_e) @ R_en)[known].max() < 2e-7
+    assert np.abs(found.velocity - rows[:, 10:13] @ R_en)[known].max() < 1e-7
+    assert np.abs(found.gyro_bias - rows[:, 4:7])[known].max() < 1e-9
+    R = R_en.T @ quaternion_to_matrix(rows[:, :4])
+    assert np.abs(quaternion_to_matrix(found.quaternion) - R)[known].max() < 1e-9
+    assert np.linalg.norm(found.gyro_bias[known], axis=1).max() > 2.5e-4
 
 
 def test_two_antennas_give_the_pose(flight):

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wildlab.simulation.twins import clip_polygon, moments, visible_part
+from wildlab.simulation.camera_detections import clip_polygon, moments, visible_part
 
 WIDTH, HEIGHT = 640.0, 512.0
 

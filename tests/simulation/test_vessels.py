@@ -7,12 +7,13 @@ from tests.simulation.test_twins import assert_in_image, marks, with_values
 from wildlab.geometry.camera_poses import camera_pose
 from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
 from wildlab.geometry.georeference import pixel_to_plane
+from wildlab.simulation.camera_detections import Exposures, exposure_times
 from wildlab.simulation.courses import twin_trajectory
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.manifest import as_flown
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.target_motion import target_outline, target_path, truth_table, way_along
-from wildlab.simulation.twins import OPTIONAL_TABLES, Exposures, exposure_times, simulate, simulate_twin
+from wildlab.simulation.twins import OPTIONAL_TABLES, simulate, simulate_twin
 
 #: Twin, detections, segments (None: not printed), tracking period in s, seconds per fix of the truth.
 FLIGHTS = [

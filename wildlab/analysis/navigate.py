@@ -133,7 +133,7 @@ def inputs_of(
         sd = np.tile([position_sd[0], position_sd[0], position_sd[1]], (len(t), 1))
     white = np.sqrt(np.maximum(sd**2 - wander**2, (0.01 * sd) ** 2))
     arms = _levers(flight, gnss)
-    aiding = {"position": positions(t, p, white, arms[0], wander, wander_time)}
+    aiding = {"position": positions(t, p, white, arms[0], 0.0, wander, wander_time)}
     moving = set(VELOCITY) <= set(gnss.columns)
     v = _velocities(gnss, t)
     spread_v = _velocity_sd(flight, gnss)
@@ -148,7 +148,7 @@ def inputs_of(
             known["gyro_bias_sd"] = noise.gyro_bias_sd
     if set(SECOND_COLUMNS) <= set(gnss.columns):
         second = gnss[list(SECOND_COLUMNS)].to_numpy(float)
-        aiding["second position"] = positions(t, second, white, arms[1], wander, wander_time)
+        aiding["second position"] = positions(t, second, white, arms[1], 0.0, wander, wander_time)
         # The fixes that it starts from are taken in once more: loosely here, so that they count once.
         known["baseline_sd"] = LOOSE * spread
         start = align_from_baseline(samples, t, p, second, *arms, gravity=gravity, **known)

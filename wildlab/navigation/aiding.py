@@ -63,7 +63,16 @@ def _aiding(
     kind: int, times: ArrayLike, value: ArrayLike, sd: ArrayLike, lever: ArrayLike, what: str
 ) -> Aiding:
     t = np.asarray(times, float)
-    z, spread, arm = (np.broadcast_to(np.asarray(a, float), (len(t), 3)) for a in (value, sd, lever))
+    shape = (len(t), 3) if t.ndim == 1 else (0, 3)
+    try:
+        z, spread, arm = (np.array(np.broadcast_to(np.asarray(a, float), shape)) for a in (value, sd, lever))
+    except ValueError:
+        raise WildlabError(
+            f"{what} of shape {np.shape(value)} and standard deviations of shape {np.shape(sd)} do not go "
+            f"with times of shape {t.shape}",
+            "give times (N,), values (N, 3), and standard deviations (N, 3), (3,) or one number",
+            field=what,
+        ) from None
     keep = np.isfinite(t) & np.isfinite(z).all(axis=1)
     z, spread, arm, t = z[keep], spread[keep], arm[keep], t[keep]
     if not (np.isfinite(spread).all() and (spread > 0).all()):
@@ -80,6 +89,7 @@ def positions(
     p_n: ArrayLike,
     sd: ArrayLike,
     lever_arm: ArrayLike = (0.0, 0.0, 0.0),
+    latency: float = 0.0,
     gauss_markov_sd: ArrayLike = 0.0,
     gauss_markov_time: float = np.inf,
 ) -> Aiding:
@@ -88,13 +98,15 @@ def positions(
     Parameters
     ----------
     times
-        (N,) s, when they were valid.
+        (N,) s, as stamped.
     p_n
         (N, 3) m in n; rows with NaN are left out.
     sd
         Standard deviations, m: (N, 3), (3,) or one number.
     lever_arm
         Of the antenna in b, (3,) m.
+    latency
+        How long before its stamp a fix was valid, s.
     gauss_markov_sd, gauss_markov_time
         Of a first-order Gauss-Markov error on top of ``sd``, which neighbouring fixes share (multipath, for
         instance): standard deviation, m, (3,) or one number, and correlation time, s. The filter estimates
@@ -107,11 +119,12 @@ def positions(
     Raises
     ------
     WildlabError
-        For a standard deviation that is not positive.
+        For shapes that do not fit, or a standard deviation that is not positive.
     ValueError
         For a ``gauss_markov_sd`` that is neither (3,) nor one number.
     """
-    found = _aiding(kernels.POSITION, times, p_n, sd, lever_arm, "GNSS positions")
+    t = np.asarray(times, float) - latency
+    found = _aiding(kernels.POSITION, t, p_n, sd, lever_arm, "GNSS positions")
     slow = np.array(np.broadcast_to(np.asarray(gauss_markov_sd, float), 3))
     return found._replace(gauss_markov=GaussMarkov(slow, gauss_markov_time) if slow.any() else None)
 
@@ -121,19 +134,22 @@ def velocities(
     v_n: ArrayLike,
     sd: ArrayLike,
     lever_arm: ArrayLike = (0.0, 0.0, 0.0),
+    latency: float = 0.0,
 ) -> Aiding:
     """Velocities of a GNSS antenna; beyond H.
 
     Parameters
     ----------
     times
-        (N,) s, when they were valid.
+        (N,) s, as stamped.
     v_n
         (N, 3) m/s in n; rows with NaN are left out.
     sd
         Standard deviations, m/s: (N, 3), (3,) or one number.
     lever_arm
         Of the antenna in b, (3,) m.
+    latency
+        How long before its stamp a velocity was valid, s.
 
     Returns
     -------
@@ -142,9 +158,32 @@ def velocities(
     Raises
     ------
     WildlabError
-        For a standard deviation that is not positive.
+        For shapes that do not fit, or a standard deviation that is not positive.
     """
-    return _aiding(kernels.VELOCITY, times, v_n, sd, lever_arm, "GNSS velocities")
+    t = np.asarray(times, float) - latency
+    return _aiding(kernels.VELOCITY, t, v_n, sd, lever_arm, "GNSS velocities")
+
+
+def standstill(times: ArrayLike, sd: float) -> Aiding:
+    """Times at which the airframe is known to stand still; beyond H.
+
+    Parameters
+    ----------
+    times
+        (N,) s.
+    sd
+        Standard deviation of each component of the velocity, which is zero, m/s.
+
+    Returns
+    -------
+    Aiding
+
+    Raises
+    ------
+    WildlabError
+        For shapes that do not fit, or a standard deviation that is not positive.
+    """
+    return _aiding(kernels.VELOCITY, times, np.zeros(3), sd, np.zeros(3), "times of standing still")
 
 
 def set_out(
@@ -262,11 +301,7 @@ def earth_field(declination: float, inclination: float) -> Array:
     return np.array([level * np.cos(declination), level * np.sin(declination), np.sin(inclination)])
 
 
-#: Between two looks at the magnetic field, s.
-APART_S = 2.0
-
-
-def share_turned(times: ArrayLike, field_b: ArrayLike, imu: ImuSamples) -> float:
+def share_turned(times: ArrayLike, field_b: ArrayLike, imu: ImuSamples, step: float = 2.0) -> float:
     """How much of the field's turning in b the gyros explain: near one where both are in the same axes.
 
     The Earth's field stands still in n, so in b it turns as the airframe does, the other way round. With an
@@ -278,6 +313,8 @@ def share_turned(times: ArrayLike, field_b: ArrayLike, imu: ImuSamples) -> float
         (N,) s and (N, 3) in b, of any unit, without the part that turns with the airframe.
     imu
         Of the same flight.
+    step
+        From one sample compared to the next, s: long enough to turn by more than the field's noise.
 
     Returns
     -------
@@ -291,7 +328,7 @@ def share_turned(times: ArrayLike, field_b: ArrayLike, imu: ImuSamples) -> float
     """
     t, m = np.asarray(times, float), np.asarray(field_b, float)
     samples = checked_imu(imu)
-    every = max(1, round(APART_S / float(np.median(np.diff(t))))) if len(t) > 1 else 1
+    every = max(1, round(step / float(np.median(np.diff(t))))) if len(t) > 1 else 1
     t, m = t[::every], m[::every]
     inside = (t >= samples.times[0]) & (t <= samples.times[-1]) & np.isfinite(m).all(axis=1)
     t, m = t[inside], m[inside]

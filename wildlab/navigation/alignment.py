@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError
-from wildlab.geometry.frames import Array, flat_earth, matrix_to_quaternion, quaternion_to_matrix
+from wildlab.geometry.frames import Array, flat_earth, matrix_to_quaternion
 from wildlab.navigation.mekf import InitialState
 from wildlab.navigation.strapdown import ImuSamples, checked_imu, integrate_strapdown
 
@@ -198,7 +198,7 @@ def align_from_baseline(
         t[i], imu, Kinematics(p[i], v, 2 * a), Reference(baseline_b, other[i] - p[i]),
         InitialSd(**{"heading_sd": baseline_sd / length, **sd}), gravity=gravity,
     )  # fmt: skip
-    from_arm = quaternion_to_matrix(start.state[6:10]) @ arm
+    from_arm = _turned(start.state[6:10], arm)
     return start._replace(state=np.concatenate([p[i] - from_arm, start.state[3:]]))
 
 
@@ -255,13 +255,15 @@ def align_from_course(
     )  # fmt: skip
 
 
-#: Level speed (m/s) from which it counts as having taken off, and how long a rest must be, s.
-TAKEN_OFF, SHORTEST = 8.0, 10.0
+def _turned(q: Array, vector: Array) -> Array:
+    w, u = q[0], q[1:]
+    return np.asarray(vector + 2 * np.cross(u, np.cross(u, vector) + w * vector), float)
 
 
 def find_rest(
-    imu: ImuSamples, times: ArrayLike, v_n: ArrayLike, *, longest: float = 30.0
-) -> tuple[float, float] | None:
+    imu: ImuSamples, times: ArrayLike, v_n: ArrayLike, *, min_speed: float = 8.0, shortest: float = 10.0,
+    longest: float = 30.0,
+) -> tuple[float, float] | None:  # fmt: skip
     """When it last stood still before it took off.
 
     Still is a second in which neither force nor rate changes as it does in anybody's hands, and in which no
@@ -273,8 +275,10 @@ def find_rest(
         Inertial measurements, from before the flight on.
     times, v_n
         (N,) s and (N, 3) m/s in n, as in :func:`align_from_course`.
-    longest
-        What a rest is cut to, s.
+    min_speed
+        Level speed (m/s) from which it counts as having taken off.
+    shortest, longest
+        How long a rest must be and what it is cut to, s.
 
     Returns
     -------
@@ -288,9 +292,9 @@ def find_rest(
     """
     t, v = np.asarray(times, float), np.asarray(v_n, float)
     samples = checked_imu(imu)
-    flown = t[np.hypot(v[:, 0], v[:, 1]) >= TAKEN_OFF]
+    flown = t[np.hypot(v[:, 0], v[:, 1]) >= min_speed]
     first, seconds = samples.times[0], int((flown.min(initial=samples.times[-1]) - samples.times[0]) // 1.0)
-    if seconds < SHORTEST:
+    if seconds < shortest:
         return None
     before = samples.times < first + seconds
     second = (samples.times[before] - first).astype(int)
@@ -305,7 +309,7 @@ def find_rest(
     still[(t[moving] - first).astype(int)] = False
     edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]])))
     for begin, end in edges.reshape(-1, 2)[::-1]:
-        if end - begin >= SHORTEST:
+        if end - begin >= shortest:
             return float(first + max(begin, end - longest)), float(first + end)
     return None
 
@@ -378,5 +382,5 @@ def align_at_rest(
     )
     q = towards(0.0).state[6:10]
     last = integrate_strapdown(part, p[i], v[i], q, flat_earth(gravity), max_gap=np.inf).quaternion[-1]
-    nose = quaternion_to_matrix(last)[:, 0]
+    nose = _turned(last, np.array([1.0, 0.0, 0.0]))
     return towards(float(np.arctan2(v[i, 1], v[i, 0]) - np.arctan2(nose[1], nose[0])))

@@ -29,7 +29,7 @@ from wildlab.geometry.frames import Array, Earth, quaternion_to_matrix
 from wildlab.navigation import kernels
 from wildlab.navigation.aiding import Aiding, gather, set_out
 from wildlab.navigation.kernels import Integers
-from wildlab.navigation.strapdown import AxisErrors, Gap, ImuSamples, checked_imu
+from wildlab.navigation.strapdown import AxisErrors, Gap, ImuSamples, Measurements, Timeline, checked_imu
 from wildlab.navigation.strapdown import ImuNoise as ImuNoise
 
 #: Verdicts on a measurement: left out by its gate; used; used after the covariance was widened.
@@ -122,6 +122,55 @@ class Navigation(NamedTuple):
     unused: list[int]
 
 
+class MekfInputs(NamedTuple):
+    """What both the compiled filter and its reference take.
+
+    ``state`` (n + 1,) and ``covariance`` (n, n) are those of the start, with the errors beyond the fifteen;
+    ``extra`` (n - 15, 2) is the density and the time of these, ``axes`` whether the axes' are among them.
+    """
+
+    line: Timeline
+    measured: Measurements
+    source: Integers
+    unused: list[int]
+    gaps: list[Gap]
+    noise: Array
+    state: Array
+    covariance: Array
+    axes: bool
+    extra: Array
+    gate: float
+
+
+def prepare(
+    imu: ImuSamples, start: InitialState, noise: ImuNoise, aiding: Sequence[Aiding], output_times: Array,
+    gate_probability: float, outages: Outages, axes: AxisErrors | None = None,
+) -> MekfInputs:  # fmt: skip
+    """Timeline, measurements in order of time, and all numbers of the filter."""
+    check_initial(start)
+    for row, one in enumerate(aiding):
+        if one.kind not in NAMES:
+            raise WildlabError(
+                "a direction in the body beside one in n is a measurement of the observer only",
+                "leave it out",
+                field=f"aiding[{row}]",
+            )
+    line, gaps = set_out(imu, start.time, aiding, output_times, outages.max_gap)
+    beyond, extra = _extra(aiding, axes)
+    state = np.concatenate([start.state, np.zeros(len(extra))])
+    covariance = block_diag(start.covariance, beyond)
+    measured, source, unused = gather(aiding, line, 15 if axes is None else 33)
+    long_run = [
+        sd if np.isinf(time) else sd * np.sqrt(2 / time)  # spectral density from the standard deviation
+        for sd, time in ((noise[2], noise[3]), (noise[4], noise[5]))
+    ]
+    numbers = np.array([*noise[:2], long_run[0], noise[3], long_run[1], noise[5], *outages[2:]])
+    return MekfInputs(
+        line, measured, source, unused, gaps, numbers, state, covariance, axes is not None, extra,
+        gate_threshold(gate_probability, 3),
+    )  # fmt: skip
+
+
 def _extra(aiding: Sequence[Aiding], axes: AxisErrors | None) -> tuple[Array, Array]:
     """Covariance at the start (n, n) of the errors beyond the fifteen; densities and times (n, 2)."""
     covariances, processes = [np.empty((0, 0))], [np.empty((0, 2))]
@@ -137,6 +186,12 @@ def _extra(aiding: Sequence[Aiding], axes: AxisErrors | None) -> tuple[Array, Ar
 def check_initial(start: InitialState) -> None:
     """Refuse an initial state that is not finite, or whose covariance is none."""
     state, P = np.asarray(start.state, float), np.asarray(start.covariance, float)
+    if state.shape != (16,) or P.shape != (15, 15):
+        raise WildlabError(
+            f"a state of the shape {state.shape} and a covariance of the shape {P.shape}",
+            "give (16,) and (15, 15)",
+            field="start",
+        )
     lost = np.flatnonzero(~np.isfinite(state))
     if len(lost):
         raise WildlabError(
@@ -213,34 +268,25 @@ def run_mekf(
     """
     wanted = checked_imu(imu).times if output_times is None else np.asarray(output_times, float)
     times, row = np.unique(wanted, return_inverse=True)
-    check_initial(start)
-    for number, one in enumerate(aiding):
-        if one.kind not in NAMES:
-            raise WildlabError(
-                "a direction in the body beside one in n is a measurement of the observer only",
-                "leave it out",
-                field=f"aiding[{number}]",
-            )
-    line, gaps = set_out(imu, start.time, aiding, times, outages.max_gap)
-    measured, source, unused = gather(aiding, line, 15 if axes is None else 33)
-    beyond, extra = _extra(aiding, axes)
-    biases = [
-        (sd if np.isinf(time) else sd * np.sqrt(2 / time), time)  # spectral density from the SD
-        for sd, time in ((noise[2], noise[3]), (noise[4], noise[5]))
-    ]
-    slow = np.concatenate([np.repeat(biases, 3, axis=0), extra])
-    states, covariances, innovation, S, nis, verdict = kernels.mekf(
-        line, measured, earth.as_array(), np.array([*noise[:2], *outages[2:]]), slow,
-        np.concatenate([start.state, np.zeros(len(extra))]), block_diag(start.covariance, beyond),
-        axes is not None, gate_threshold(gate_probability, 3), float(outages.patience), len(times),
+    ready = prepare(imu, start, noise, aiding, times, gate_probability, outages, axes)
+    line, measured = ready.line, ready.measured
+    states, covariances = np.full((len(times), 16), np.nan), np.full((len(times), 15, 15), np.nan)
+    n = len(measured.node)
+    innovation, S, nis = np.full((n, 3), np.nan), np.full((n, 3, 3), np.nan), np.full(n, np.nan)
+    verdict = np.zeros(n, np.int64)
+    kernels.mekf(
+        line.times, line.f, line.w, line.gap, line.row_of_node, earth.as_array(), ready.noise,
+        ready.state, ready.covariance, ready.axes, ready.extra, measured.node, measured.kind,
+        measured.value, measured.variance, measured.lever, measured.gauss_markov, ready.gate,
+        float(outages.patience), states, covariances, innovation, S, nis, verdict,
     )  # fmt: skip
-    for gap in gaps:
+    for gap in ready.gaps:
         unknown = (times > gap.start) & (times < gap.end)
         states[unknown], covariances[unknown] = np.nan, np.nan
     states, covariances = states[row], covariances[row]
-    what = Innovations(line.times[measured.node], source, innovation, S, nis, verdict)
+    what = Innovations(line.times[measured.node], ready.source, innovation, S, nis, verdict)
     parts = (states[:, :3], states[:, 3:6], states[:, 6:10], states[:, 10:13], states[:, 13:])
-    return Navigation(wanted, *parts, covariances, what, gaps, unused)
+    return Navigation(wanted, *parts, covariances, what, ready.gaps, ready.unused)
 
 
 def pose_covariance(covariance: ArrayLike) -> Array:

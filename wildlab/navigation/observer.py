@@ -30,10 +30,11 @@ from wildlab.navigation.aiding import Aiding, gather, set_out
 from wildlab.navigation.kernels import (
     POSITION,
     VELOCITY,
+    Integers,
     exponential,
     multiply,
+    normalise,
     rotation_of,
-    skew,
 )
 from wildlab.navigation.mekf import InitialState, check_initial
 from wildlab.navigation.strapdown import Gap, ImuSamples, Measurements, Timeline, checked_imu
@@ -43,111 +44,189 @@ MU, RADIUS, J2, RATE = 3.986004418e14, 6378137.0, 1.082629821313e-3, 7.292115e-5
 
 
 @compiled
-def gravity_at(p: Array) -> Array:
+def gravity_at(p: Array, g: Array) -> None:
     """Gravity in ECEF, m/s^2: the Earth's attraction with its flattening, and the centrifugal force.
 
     What J2 leaves out is below 2e-4 m/s^2, some 20 millionths of it.
     """
-    square = p @ p
-    flat = 1.5 * J2 * RADIUS**2 / square * (np.array((1.0, 1.0, 3.0)) - 5 * p[2] ** 2 / square)
-    return -MU / square**1.5 * p * (1 + flat) + RATE**2 * np.array((p[0], p[1], 0.0))
+    square = p[0] * p[0] + p[1] * p[1] + p[2] * p[2]
+    pull = -MU / (square * np.sqrt(square))
+    flat, polar = 1.5 * J2 * RADIUS * RADIUS / square, 5 * p[2] * p[2] / square
+    g[0] = pull * p[0] * (1 + flat * (1 - polar)) + RATE * RATE * p[0]
+    g[1] = pull * p[1] * (1 + flat * (1 - polar)) + RATE * RATE * p[1]
+    g[2] = pull * p[2] * (1 + flat * (3 - polar))
 
 
 @compiled
-def attitude_step(q: Array, turn: Array, turned: float) -> Array:
+def attitude_step(q: Array, turn: Array, turned: float, work: Array) -> None:
     """``q`` turned by half a rotation vector ``turn`` (3,) in b, and by ``turned`` (rad) of the Earth."""
-    return multiply(exponential(np.array((0.0, 0.0, -turned))), multiply(q, exponential(turn / 2)))
+    by, after = work[0], work[1]
+    exponential(turn[0] / 2, turn[1] / 2, turn[2] / 2, by)
+    multiply(q, by, after)
+    exponential(0.0, 0.0, -turned, by)
+    multiply(by, after, q)
+    normalise(q)
 
 
 @compiled
-def unit(a: Array) -> Array:
-    size = np.sqrt(a @ a)
-    return a / size if size > 0 else np.zeros(3)
+def cross(a: Array, b: Array, out: Array) -> None:
+    out[0], out[1], out[2] = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @compiled
-def force_directions(f: Array, R: Array, xi: Array, limit: float) -> tuple[Array, Array]:
+def unit(a: Array, out: Array) -> None:
+    size = np.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+    for i in range(3):
+        out[i] = a[i] / size if size > 0 else 0.0
+
+
+@compiled
+def force_directions(
+    f: Array, R: Array, xi: Array, limit: float, f_b: Array, f_e: Array, work: Array
+) -> None:
     """H (5.39): the measured direction in b, the estimated one in e."""
-    return unit(f), unit(np.clip(R @ f + xi, -limit, limit))
+    unit(f, f_b)
+    for i in range(3):
+        work[i] = R[i, 0] * f[0] + R[i, 1] * f[1] + R[i, 2] * f[2] + xi[i]
+        work[i] = min(max(work[i], -limit), limit)
+    unit(work, f_e)
 
 
 @compiled
-def injection(a_b: Array, a_e: Array, R: Array, gain: float) -> Array:
+def injection(a_b: Array, a_e: Array, R: Array, gain: float, out: Array, work: Array) -> None:
     """One term of H (5.36)."""
-    return gain * (skew(a_b) @ (R.T @ a_e))
+    for i in range(3):
+        work[i] = R[0, i] * a_e[0] + R[1, i] * a_e[1] + R[2, i] * a_e[2]
+    cross(a_b, work, out)
+    for i in range(3):
+        out[i] *= gain
 
 
 @compiled
-def projected(b: Array, move: Array, inner: float, outer: float) -> Array:
-    """``move`` without what would carry the bias over its bound."""
-    square, along = b @ b, b @ move
-    if square <= inner**2 or along <= 0:
-        return move
-    share = min(1.0, float((square - inner**2) / (outer**2 - inner**2)))
-    return move - share * along * b / square
+def project(b: Array, move: Array, inner: float, outer: float) -> None:
+    """Takes from ``move`` what would carry the bias over its bound."""
+    square = b[0] * b[0] + b[1] * b[1] + b[2] * b[2]
+    along = b[0] * move[0] + b[1] * move[1] + b[2] * move[2]
+    if square > inner * inner and along > 0:
+        share = min(1.0, (square - inner * inner) / (outer * outer - inner * inner))
+        for i in range(3):
+            move[i] -= share * along * b[i] / square
 
 
 @compiled
-def update(x: Array, P: Array, y: Array, variance: Array, first: int, theta: float) -> tuple[Array, Array]:
+def update(x: Array, P: Array, y: Array, variance: Array, first: int, theta: float, K: Array) -> None:
     """Measurement update of the elements from ``first`` on, with the gains H (5.48)-(5.49)."""
-    s_first, H = theta if first == 3 else 1.0, np.zeros((3, 9))
-    H[:, first : first + 3] = np.eye(3)
-    PH = P @ H.T
-    K = PH @ np.linalg.inv(H @ PH + np.diag(variance) / (s_first**2 * theta))
-    P = P - K @ PH.T
-    scale = np.repeat(np.array((1.0, theta, theta**2)), 3)
-    return x + scale * (K @ y) / s_first, (P + P.T) / 2
+    S, s_first = np.empty((3, 3)), theta if first == 3 else 1.0
+    for i in range(3):
+        for j in range(3):
+            S[i, j] = P[first + i, first + j]
+        S[i, i] += variance[i] / (s_first * s_first * theta)
+    inverse = np.linalg.inv(S)
+    for i in range(9):
+        for j in range(3):
+            K[i, j] = 0.0
+            for k in range(3):
+                K[i, j] += P[i, first + k] * inverse[k, j]
+    scale = 1.0
+    for i in range(9):
+        if i == 3 or i == 6:
+            scale *= theta
+        for j in range(3):
+            x[i] += scale * K[i, j] * y[j] / s_first
+    rows = P[first : first + 3].copy()
+    for i in range(9):
+        for j in range(9):
+            for k in range(3):
+                P[i, j] -= K[i, k] * rows[k, j]
+    for i in range(9):
+        for j in range(i):
+            P[i, j] = P[j, i] = (P[i, j] + P[j, i]) / 2
 
 
 @compiled
-def riccati_step(P: Array, h: float, q_f: float, q_xi: float) -> Array:
+def riccati_step(P: Array, h: float, q_f: float, q_xi: float) -> None:
     """H (5.50) between measurements, over the scaled time h: the transition is a polynomial."""
-    Phi = np.eye(9) + h * np.eye(9, k=3) + h * h / 2 * np.eye(9, k=6)
-    return Phi @ P @ Phi.T + h * np.diag(np.repeat(np.array((0.0, q_f, q_xi)), 3))
+    for _ in range(2):  # once from the left and, transposed, once from the right
+        for i in range(3):
+            for j in range(9):
+                P[i, j] += h * (P[3 + i, j] + h / 2 * P[6 + i, j])
+                P[3 + i, j] += h * P[6 + i, j]
+        for i in range(9):
+            for j in range(i):
+                P[i, j], P[j, i] = P[j, i], P[i, j]
+    for i in range(3, 6):
+        P[i, i] += h * q_f
+        P[3 + i, 3 + i] += h * q_xi
 
 
 @compiled
 def observe(
-    line: Timeline, measured: Measurements, gains: Array, q: Array, b: Array, x: Array, P: Array, out: Array
-) -> None:
+    times: Array, f: Array, w: Array, gap: Array, row_of_node: Integers, node: Integers, kind: Integers,
+    value: Array, variance: Array, lever: Array, gains: Array, q: Array, b: Array, x: Array, P: Array,
+    out: Array,
+) -> None:  # fmt: skip
     k1, k2, k_i, inner, outer, theta, q_f, q_xi, limit, hold = gains
-    held, held_until, event, earth = np.zeros(3), -np.inf, 0, np.array((0.0, 0.0, RATE))
-    for k in range(len(line.times)):
+    R, f_mean, sigma, held, move = np.empty((3, 3)), np.empty(3), np.empty(3), np.zeros(3), np.empty(3)
+    f_b, f_e, g, a, c, work = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    y, K, held_until, quaternions = np.empty(3), np.empty((9, 3)), -np.inf, np.empty((2, 4))
+    event = 0
+    for k in range(len(times)):
         if k > 0:
-            dt = line.times[k] - line.times[k - 1]
-            if line.gap[k] > 0:
-                x[:3] += dt * x[3:6]
+            dt = times[k] - times[k - 1]
+            if gap[k] > 0:
+                for i in range(3):
+                    x[i] += dt * x[3 + i]
             else:
-                f, w = (line.f[k - 1] + line.f[k]) / 2, (line.w[k - 1] + line.w[k]) / 2
-                R = rotation_of(q)
-                f_b, f_e = force_directions(f, R, x[6:9], limit)
-                sigma = injection(f_b, f_e, R, k1)
-                if line.times[k] <= held_until:
-                    sigma += held
-                turn = dt * (w - b + sigma)
-                half = attitude_step(q, turn, RATE * dt / 2)
-                q, R = attitude_step(half, turn, RATE * dt / 2), rotation_of(half)
-                b = b + dt * projected(b, -k_i * sigma, inner, outer)
-                change = dt * (R @ f + x[6:9] + gravity_at(x[:3]) - 2 * (skew(earth) @ x[3:6]))
-                x[:3] += dt * (x[3:6] + change / 2)
-                x[3:6] += change
-                x[6:9] -= dt * (R @ (skew(sigma) @ f))
-            P = riccati_step(P, theta * dt, q_f, q_xi)
-        while event < len(measured.node) and measured.node[event] == k:
-            R, kind = rotation_of(q), measured.kind[event]
-            value, lever = measured.value[event], measured.lever[event]
-            if kind in (POSITION, VELOCITY):
-                first = 0 if kind == POSITION else 3
-                arm = lever if kind == POSITION else skew(line.w[k] - b) @ lever
-                y = value - x[first : first + 3] - R @ arm
-                x, P = update(x, P, y, measured.variance[event], first, theta)
+                for i in range(3):
+                    f_mean[i] = (f[k - 1, i] + f[k, i]) / 2
+                rotation_of(q, R)
+                force_directions(f_mean, R, x[6:9], limit, f_b, f_e, work)
+                injection(f_b, f_e, R, k1, sigma, work)
+                if times[k] <= held_until:
+                    for i in range(3):
+                        sigma[i] += held[i]
+                for i in range(3):
+                    a[i] = dt * ((w[k - 1, i] + w[k, i]) / 2 - b[i] + sigma[i])
+                    move[i] = -k_i * sigma[i]
+                attitude_step(q, a, RATE * dt / 2, quaternions)
+                rotation_of(q, R)
+                attitude_step(q, a, RATE * dt / 2, quaternions)
+                project(b, move, inner, outer)
+                gravity_at(x, g)
+                cross(sigma, f_mean, c)
+                vx, vy = x[3], x[4]
+                for i in range(3):
+                    b[i] += dt * move[i]
+                    force = R[i, 0] * f_mean[0] + R[i, 1] * f_mean[1] + R[i, 2] * f_mean[2] + x[6 + i]
+                    turn = 2 * RATE * vy if i == 0 else (-2 * RATE * vx if i == 1 else 0.0)
+                    change = dt * (force + g[i] + turn)
+                    x[i] += dt * (x[3 + i] + change / 2)
+                    x[3 + i] += change
+                for i in range(3):
+                    x[6 + i] -= dt * (R[i, 0] * c[0] + R[i, 1] * c[1] + R[i, 2] * c[2])
+            riccati_step(P, theta * dt, q_f, q_xi)
+        while event < len(node) and node[event] == k:
+            rotation_of(q, R)
+            sort = kind[event]
+            if sort in (POSITION, VELOCITY):
+                first = 0 if sort == POSITION else 3
+                arm = lever[event]
+                if sort == VELOCITY:
+                    cross(w[k] - b, lever[event], c)
+                    arm = c
+                for i in range(3):
+                    y[i] = value[event, i] - x[first + i]
+                    y[i] -= R[i, 0] * arm[0] + R[i, 1] * arm[1] + R[i, 2] * arm[2]
+                update(x, P, y, variance[event], first, theta, K)
             else:
                 # A direction: value in e, lever in b, H (5.38).
-                f_b, f_e = force_directions(line.f[k], R, x[6:9], limit)
-                held = injection(skew(f_b) @ lever, skew(f_e) @ value, R, k2)
-                held_until = line.times[k] + hold
+                force_directions(f[k], R, x[6:9], limit, f_b, f_e, work)
+                cross(f_b, lever[event], a)
+                cross(f_e, value[event], c)
+                injection(a, c, R, k2, held, work)
+                held_until = times[k] + hold
             event += 1
-        row = line.row_of_node[k]
+        row = row_of_node[k]
         if row >= 0:
             out[row, :4], out[row, 4:7], out[row, 7:16] = q, b, x
 
@@ -202,6 +281,15 @@ class Observed(NamedTuple):
     unused: list[int]
 
 
+def _reference(times: ArrayLike, in_b: ArrayLike, in_n: ArrayLike) -> Aiding:
+    t = np.asarray(times, float)
+    b, n = (np.array(np.broadcast_to(np.asarray(a, float), (len(t), 3))) for a in (in_b, in_n))
+    sizes = np.linalg.norm(b, axis=1), np.linalg.norm(n, axis=1)
+    keep = np.isfinite(t) & (sizes[0] > 0) & (sizes[1] > 0) & np.isfinite(sizes[0] + sizes[1])
+    b, n = b[keep] / sizes[0][keep, None], n[keep] / sizes[1][keep, None]
+    return Aiding(REFERENCE, t[keep], n, np.ones_like(n), b)
+
+
 def baseline_reference(
     times: ArrayLike, p_first: ArrayLike, p_second: ArrayLike, lever_first: ArrayLike, lever_second: ArrayLike
 ) -> Aiding:
@@ -227,7 +315,7 @@ def baseline_reference(
         For shapes that do not fit.
     """
     in_b = np.asarray(lever_second, float) - np.asarray(lever_first, float)
-    return field_reference(times, in_b, np.asarray(p_second, float) - np.asarray(p_first, float))
+    return _reference(times, in_b, np.asarray(p_second, float) - np.asarray(p_first, float))
 
 
 def field_reference(times: ArrayLike, field_b: ArrayLike, field_n: ArrayLike) -> Aiding:
@@ -252,25 +340,24 @@ def field_reference(times: ArrayLike, field_b: ArrayLike, field_n: ArrayLike) ->
     ValueError
         For shapes that do not fit.
     """
-    t = np.asarray(times, float)
-    b, n = (np.array(np.broadcast_to(np.asarray(a, float), (len(t), 3))) for a in (field_b, field_n))
-    sizes = np.linalg.norm(b, axis=1), np.linalg.norm(n, axis=1)
-    keep = np.isfinite(t) & (sizes[0] > 0) & (sizes[1] > 0) & np.isfinite(sizes[0] + sizes[1])
-    b, n = b[keep] / sizes[0][keep, None], n[keep] / sizes[1][keep, None]
-    return Aiding(REFERENCE, t[keep], n, np.ones_like(n), b)
+    return _reference(times, field_b, field_n)
 
 
-def course_reference(times: ArrayLike, v_n: ArrayLike, min_speed: float = 8.0) -> Aiding:
+def course_reference(
+    times: ArrayLike, v_n: ArrayLike, min_speed: float = 8.0, latency: float = 0.0
+) -> Aiding:
     """The nose along the velocity over the ground. Beyond H.
 
     Parameters
     ----------
     times
-        (N,) s, when they were valid.
+        (N,) s, as stamped.
     v_n
         (N, 3) m/s in n; rows with NaN are left out.
     min_speed
         Level speed (m/s) from which a course counts.
+    latency
+        How long before its stamp a velocity was valid, s.
 
     Returns
     -------
@@ -284,7 +371,21 @@ def course_reference(times: ArrayLike, v_n: ArrayLike, min_speed: float = 8.0) -
     """
     v = np.array(v_n, float)
     v[~(np.hypot(v[:, 0], v[:, 1]) >= min_speed)] = np.nan
-    return field_reference(times, [1.0, 0.0, 0.0], v)
+    return _reference(np.asarray(times, float) - latency, [1.0, 0.0, 0.0], v)
+
+
+class ObserverInputs(NamedTuple):
+    """What both the compiled observer and its reference take; positions and directions in e."""
+
+    line: Timeline
+    measured: Measurements
+    gains: Array
+    q: Array
+    bias: Array
+    x: Array
+    P: Array
+    unused: list[int]
+    gaps: list[Gap]
 
 
 def earth_axes(origin: Origin) -> tuple[Array, Array]:
@@ -293,6 +394,39 @@ def earth_axes(origin: Origin) -> tuple[Array, Array]:
     north = [-np.sin(lat) * np.cos(lon), -np.sin(lat) * np.sin(lon), np.cos(lat)]
     east = [-np.sin(lon), np.cos(lon), 0.0]
     return geodetic_to_ecef(*origin), np.stack([north, east, np.cross(north, east)], axis=-1)
+
+
+def prepare(
+    imu: ImuSamples,
+    start: InitialState,
+    origin: Origin,
+    aiding: Sequence[Aiding],
+    gains: Gains,
+    wanted: Array,
+    max_gap: float,
+) -> ObserverInputs:
+    check_initial(start)
+    line, gaps = set_out(imu, start.time, aiding, wanted, max_gap)
+    p_e, R_en = earth_axes(origin)
+    in_e = [a._replace(value=a.value @ R_en.T + (p_e if a.kind == POSITION else 0.0)) for a in aiding]
+    measured, _, unused = gather(in_e, line)
+    seen = line.times[np.unique(measured.node[measured.kind == REFERENCE])]
+    apart = np.diff(seen) if len(seen) > 1 else [0.0]
+    numbers = np.array(
+        [
+            gains.k1, gains.k2, gains.k_i, gains.bias_bound, 1.2 * gains.bias_bound, gains.theta,
+            gains.force_noise**2, gains.correction_noise**2, gains.force_bound, 1.5 * float(np.median(apart)),
+        ]
+    )  # fmt: skip
+    state = np.asarray(start.state, float)
+    x = np.concatenate([p_e + R_en @ state[:3], R_en @ state[3:6], np.zeros(3)])
+    q = matrix_to_quaternion(R_en @ quaternion_to_matrix(state[6:10]))
+    # What the estimated force may be off by at first: the accelerometers' bias, and gravity leaning with
+    # roll.
+    force = (9.8**2 * start.covariance[6:9, 6:9] + start.covariance[9:12, 9:12]).trace() / 3
+    spread = [start.covariance[i : i + 3, i : i + 3].trace() / 3 for i in (0, 3)] + [force]
+    P = np.diag(np.repeat(spread, 3) / np.repeat([1.0, gains.theta**2, gains.theta**4], 3))
+    return ObserverInputs(line, measured, numbers, q, state[13:].copy(), x, P, unused, gaps)
 
 
 def run_observer(
@@ -335,38 +469,23 @@ def run_observer(
     """
     wanted = checked_imu(imu).times if output_times is None else np.asarray(output_times, float)
     times, row = np.unique(wanted, return_inverse=True)
-    gains = gains or Gains()
-    check_initial(start)
-    line, gaps = set_out(imu, start.time, aiding, times, max_gap)
-    p_e, R_en = earth_axes(origin)
-    in_e = [a._replace(value=a.value @ R_en.T + (p_e if a.kind == POSITION else 0.0)) for a in aiding]
-    measured, _, unused = gather(in_e, line)
-    seen = line.times[np.unique(measured.node[measured.kind == REFERENCE])]
-    apart = np.diff(seen) if len(seen) > 1 else [0.0]
-    numbers = np.array(
-        [
-            gains.k1, gains.k2, gains.k_i, gains.bias_bound, 1.2 * gains.bias_bound, gains.theta,
-            gains.force_noise**2, gains.correction_noise**2, gains.force_bound, 1.5 * float(np.median(apart)),
-        ]
-    )  # fmt: skip
-    state = np.asarray(start.state, float)
-    x = np.concatenate([p_e + R_en @ state[:3], R_en @ state[3:6], np.zeros(3)])
-    q = matrix_to_quaternion(R_en @ quaternion_to_matrix(state[6:10]))
-    # What the estimated force may be off by at first: the accelerometers' bias, and gravity leaning with
-    # roll.
-    force = (9.8**2 * start.covariance[6:9, 6:9] + start.covariance[9:12, 9:12]).trace() / 3
-    spread = [start.covariance[i : i + 3, i : i + 3].trace() / 3 for i in (0, 3)] + [force]
-    P = np.diag(np.repeat(spread, 3) / np.repeat([1.0, gains.theta**2, gains.theta**4], 3))
+    ready = prepare(imu, start, origin, aiding, gains or Gains(), times, max_gap)
+    line, measured = ready.line, ready.measured
     out = np.full((len(times), 16), np.nan)
-    observe(line, measured, numbers, q, state[13:].copy(), x, P, out)
-    for gap in gaps:
+    observe(
+        line.times, line.f, line.w, line.gap, line.row_of_node, measured.node, measured.kind,
+        measured.value, measured.variance, measured.lever, ready.gains, ready.q, ready.bias, ready.x,
+        ready.P, out,
+    )  # fmt: skip
+    for gap in ready.gaps:
         out[(times > gap.start) & (times < gap.end)] = np.nan
     rows = out[row]
+    p_e, R_en = earth_axes(origin)
     quaternion = np.full((len(wanted), 4), np.nan)
     filled = np.isfinite(rows[:, 0])
     if filled.any():
         quaternion[filled] = matrix_to_quaternion(R_en.T @ quaternion_to_matrix(rows[filled, :4]))
     return Observed(
         wanted, (rows[:, 7:10] - p_e) @ R_en, rows[:, 10:13] @ R_en, quaternion, rows[:, 4:7],
-        rows[:, 13:] @ R_en, gaps, unused,
+        rows[:, 13:] @ R_en, ready.gaps, ready.unused,
     )  # fmt: skip

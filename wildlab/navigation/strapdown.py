@@ -174,6 +174,12 @@ def checked_imu(imu: ImuSamples) -> ImuSamples:
         If shapes do not fit, fewer than two samples are left, or times do not increase.
     """
     t, f, w = (np.asarray(part, float) for part in imu)
+    if t.ndim != 1 or f.shape != (len(t), 3) or w.shape != (len(t), 3):
+        raise WildlabError(
+            f"inertial samples have the shapes {t.shape}, {f.shape} and {w.shape}",
+            "give times (N,), specific force (N, 3) and angular rate (N, 3)",
+            field="imu",
+        )
     whole = np.isfinite(t) & np.isfinite(f).all(axis=1) & np.isfinite(w).all(axis=1)
     t, f, w = t[whole], f[whole], w[whole]
     if len(t) < 2:
@@ -285,5 +291,5 @@ def integrate_strapdown(
     )
     states = np.full((len(samples.times), 16), np.nan)
     t, f, w = (part[:n] for part in samples)
-    states[:n] = kernels.integrate(t, f, w, earth.as_array(), start)
+    kernels.integrate(t, f, w, earth.as_array(), start, states[:n])
     return DeadReckoning(samples.times, states[:, :3], states[:, 3:6], states[:, 6:10], gaps)

@@ -14,6 +14,7 @@ Where a change belongs:
   `target_motion`, and the ground in `landscape`;
 - sensors: `onboard_sensors`, and the `error_models` that they share; what is said of them, and what they are:
   `manifest`;
-- the whole flight, and what is found in its images: `twins`; what its camera would have seen, as images with
-  labels: `scene`.
+- speed: `kernels`, compiled;
+- tables: `camera_detections`;
+- the whole flight: `twins`; what its camera would have seen, as images with labels: `scene`.
 """

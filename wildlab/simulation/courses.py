@@ -21,12 +21,12 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import georeference_pixels
+from wildlab.simulation import kernels
 from wildlab.simulation.landscape import even_times, heights_along
 from wildlab.simulation.manifest import true_mount, twin_manifest
 from wildlab.simulation.parameters import Group, TwinParameters
 from wildlab.simulation.target_motion import enclosure_axes
 from wildlab.simulation.trajectory import (
-    NO_DISTURBANCE,
     AttitudeDisturbance,
     Disturbance,
     FlightPath,
@@ -35,6 +35,7 @@ from wildlab.simulation.trajectory import (
     Trajectory,
     band_limited_disturbance,
     fixed_wing_trajectory,
+    no_disturbance,
     thrust_aligned_trajectory,
 )
 
@@ -189,19 +190,27 @@ def laps_path(laps: Laps, altitude: ArrayLike, errors: ControlErrors | None = No
         axis=-1,
     )
     interval = laps.roll_time / _RISE
-    spline = _smoothed(knots, rough, interval)
-    off = errors or ControlErrors(NO_DISTURBANCE, NO_DISTURBANCE, NO_DISTURBANCE)
+    start, coefficients = _polynomials(_smoothed(knots, rough, interval))
+    off = errors or ControlErrors(no_disturbance(), no_disturbance(), no_disturbance())
     signs = (1.0, 1.0, -1.0)
 
     def path(times: Array) -> tuple[Array, Array, Array]:
-        t = np.asarray(times, float)
-        p, v, a = (spline(t, derivative) for derivative in range(3))
+        t = np.ascontiguousarray(times, float)
+        p, v, a = (np.empty((len(t), 3)) for _ in range(3))
+        kernels.piecewise_polynomial(t, start, interval, coefficients, p, v, a)
         for axis, (error, sign) in enumerate(zip(off, signs, strict=True)):
             for part, derivative in zip((p, v, a), error.with_derivatives(t), strict=True):
                 part[:, axis] += sign * derivative
         return p, v, a
 
     return path
+
+
+def _polynomials(spline: BSpline) -> tuple[float, Array]:
+    """Where a spline begins, s, and its polynomials between knots: (M, 3, 8), in ascending powers."""
+    pieces = spline.t[_DEGREE : -_DEGREE - 1]
+    taylor = [spline.derivative(d)(pieces) / math.factorial(d) for d in range(_DEGREE + 1)]
+    return float(pieces[0]), np.ascontiguousarray(np.stack(taylor, axis=-1))
 
 
 def leg_headings(laps: Laps) -> Signal:
@@ -279,9 +288,6 @@ def cable_heights(cable: Group, lap: float, duration: float) -> Array:
     return np.stack([span * lap / cable.spans.number, middle - swing * np.cos(2 * np.pi * span)], axis=-1)
 
 
-#: Angles of a circle whose times are known beforehand, and Newton's steps from the nearest of them.
-_NODES, _STEPS = 1024, 4
-
 Turn = Literal["clockwise", "counter-clockwise"]
 
 
@@ -333,62 +339,26 @@ def loiter_path(
     w = np.asarray(wind, float)
     if not np.hypot(*w) < airspeed or not radius > 0:
         raise ValueError("the airspeed must exceed the wind, and the radius zero")
-    off_radius, off_altitude = radius_error or NO_DISTURBANCE, altitude_error or NO_DISTURBANCE
+    off_radius, off_altitude = radius_error or no_disturbance(), altitude_error or no_disturbance()
     sense = 1.0 if turn == "clockwise" else -1.0
-    circle = _Circle(radius, airspeed, w, sense, start_angle)
-    mean, series = _times_of_angles(circle)
+    circle = tuple(float(part) for part in (radius, airspeed, *w, sense, start_angle))
+    times_of_angles = _times_of_angles(circle)
 
     def path(times: Array) -> tuple[Array, Array, Array]:
-        t = np.asarray(times, float)
-        angles = _angles_at(t, circle, mean, series)
-        outward = np.stack([np.cos(angles), np.sin(angles)])
-        clockwise = np.stack([-outward[1], outward[0]])
-        spin, slope = _round_rate(angles, circle)
-        r, r1, r2 = off_radius.with_derivatives(t)
-        h, h1, h2 = off_altitude.with_derivatives(t)
-        r += radius
-        p = r * outward + c[:, None]
-        v = r1 * outward + r * spin * clockwise
-        a = (r2 - r * spin * spin) * outward + (2 * r1 * spin + r * slope * spin) * clockwise
-        return np.vstack([p, -altitude - h]).T, np.vstack([v, -h1]).T, np.vstack([a, -h2]).T
+        t = np.ascontiguousarray(times, float)
+        angles = np.empty(len(t))
+        kernels.angles_on_circle(t, circle, *times_of_angles, angles)
+        p, v, a = (np.empty((len(t), 3)) for _ in range(3))
+        kernels.circle_motion(angles, circle, off_radius.with_derivatives(t), p, v, a)
+        p[:, :2] += c
+        off = off_altitude.with_derivatives(t)
+        p[:, 2], v[:, 2], a[:, 2] = -altitude - off[0], -off[1], -off[2]
+        return p, v, a
 
     return path
 
 
-class _Circle(NamedTuple):
-    """A circle in a wind (north, east), flown clockwise (1) or the other way (-1) from a bearing on."""
-
-    radius: float
-    airspeed: float
-    wind: Array
-    sense: float
-    start: float
-
-
-def _round_rate(angle: Array, circle: _Circle) -> tuple[Array, Array]:
-    """Angular rate around a circle by the wind triangle, and its derivative with respect to the angle."""
-    c, s, (north, east), sense = np.cos(angle), np.sin(angle), circle.wind, circle.sense
-    cross, along = c * north + s * east, c * east - s * north
-    through_air = np.sqrt(circle.airspeed**2 - cross**2)
-    slope = -sense * cross - cross * along / through_air
-    return sense * (sense * along + through_air) / circle.radius, sense * slope / circle.radius
-
-
-def _angles_at(times: Array, circle: _Circle, mean: float, series: Array) -> Array:
-    """Bearing from the centre at every time: `_times_of_angles` turned round, by Newton's method."""
-
-    def passed(x: Array) -> Array:
-        return np.asarray(mean * x + np.polyval([*series[::-1], -series.sum()], np.exp(1j * x)).real)
-
-    laps, rest = np.divmod(times, 2 * np.pi * mean)
-    nodes = np.linspace(0.0, 2 * np.pi, _NODES + 1)
-    x = 2 * np.pi * laps + np.interp(rest, passed(nodes), nodes)
-    for _ in range(_STEPS):
-        x -= (passed(x) - times) * np.abs(_round_rate(circle.start + circle.sense * x, circle)[0])
-    return circle.start + circle.sense * x
-
-
-def _times_of_angles(circle: _Circle) -> tuple[float, Array]:
+def _times_of_angles(circle: tuple[float, ...]) -> tuple[float, Array, Array]:
     """The time to turn through an angle x, as ``mean x + Re sum_k series_k (exp(i k x) - 1)``.
 
     The rate is periodic in the angle, so its inverse has an integral that is a Fourier series: exact to
@@ -397,15 +367,20 @@ def _times_of_angles(circle: _Circle) -> tuple[float, Array]:
 
     Returns
     -------
-    The mean, s per rad, and the series, (K,) s.
+    The mean, s per rad, and the real and imaginary parts of the series, (K,) s.
     """
-    turned = 2 * np.pi * np.arange(_NODES) / _NODES  # how far around since the start, always increasing
-    rates = _round_rate(circle.start + circle.sense * turned, circle)[0]
-    spectrum = np.fft.rfft(1.0 / np.abs(rates)) / _NODES
+    radius, airspeed, *wind, sense, start = circle
+    count = 1024
+    turned = 2 * np.pi * np.arange(count) / count  # how far around since the start, always increasing
+    c, s = np.cos(start + sense * turned), np.sin(start + sense * turned)
+    tail, cross = sense * np.stack([-s, c], axis=-1) @ wind, np.stack([c, s], axis=-1) @ wind
+    rates = sense * (tail + np.sqrt(airspeed**2 - cross**2)) / radius  # by the wind triangle
+    spectrum = np.fft.rfft(1.0 / np.abs(rates)) / count
     mean = float(spectrum[0].real)
-    series = 2 * spectrum[1:-1] / (1j * np.arange(1, _NODES // 2))
+    series = 2 * spectrum[1:-1] / (1j * np.arange(1, count // 2))
     strong = np.flatnonzero(np.abs(series) > 1e-17 * mean)
-    return mean, series[: strong[-1] + 1] if len(strong) else series[:1]
+    series = series[: strong[-1] + 1] if len(strong) else series[:1]
+    return mean, np.ascontiguousarray(series.real), np.ascontiguousarray(series.imag)
 
 
 def twin_trajectory(twin: TwinParameters, rng: np.random.Generator) -> Trajectory:

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from wildlab.geometry.frames import Array
+from wildlab.simulation import kernels
 
 
 def stream(seed: int, name: str) -> np.random.Generator:
@@ -68,14 +69,9 @@ def gauss_markov(
     ValueError
         Where standard deviations and correlation times are not as many, or ``count`` is negative.
     """
-    from scipy.signal import lfilter  # brings scipy.stats along, which takes long
-
     spread, tau = np.broadcast_arrays(np.atleast_1d(np.asarray(sd, float)), np.atleast_1d(correlation_time))
     draws = rng.standard_normal((count, len(spread)))
-    kept = np.exp(-step / tau.astype(float))
-    draws[1:] *= np.sqrt(1 - kept**2)
-    for k in range(len(kept)):
-        draws[:, k] = lfilter([spread[k]], [1.0, -kept[k]], draws[:, k])
+    kernels.gauss_markov(draws, np.array(spread), np.exp(-step / tau.astype(float)))
     return draws
 
 

@@ -135,12 +135,22 @@ def synthetic_landscape(
     Terrain
         Its heights are exact: ``sd`` is zero.
 
+    Raises
+    ------
+    WildlabError
+        Where a size is not above zero, or the map is smaller than two steps.
+
     Examples
     --------
     >>> land = synthetic_landscape(1)
     >>> land.height.shape, float(land.height.min()), round(float(land.height.max()), 3)
     ((251, 501), 0.0, 51.0)
     """
+    if not (step > 0 and relief >= 0 and min(north, east) >= 2 * step and max(north, east) < np.inf):
+        raise WildlabError(
+            f"land of {north:g} m by {east:g} m with {relief:g} m of relief, a node every {step:g} m",
+            "give metres above zero, and two steps each way at least",
+        )
     shape = (round(north / step) + 1, round(east / step) + 1)
     height = _field(shape, step, np.random.default_rng(seed))
     height *= relief / max(float(np.ptp(height)), 1e-12)
@@ -174,12 +184,22 @@ def grow_trees(
     Terrain
         Its nodes are those of the land, as high as the tree that stands there.
 
+    Raises
+    ------
+    WildlabError
+        Where the share is not between 0 and 1, or a length is not above zero.
+
     Examples
     --------
     >>> land = synthetic_landscape(1)
     >>> round(float((grow_trees(land, 1).height > land.height).mean()), 2)
     0.15
     """
+    if not (0 <= share <= 1 and 0 < height < np.inf and 0 < stand < np.inf):
+        raise WildlabError(
+            f"trees of {height:g} m on {share:g} of the ground, {stand:g} m across",
+            "give a share between 0 and 1, and metres above zero",
+        )
     rng = np.random.default_rng([seed, 1])
     noise = ndimage.gaussian_filter(rng.standard_normal(land.height.shape), stand / land.step, mode="wrap")
     covered = noise > np.quantile(noise, 1 - share) if share < 1 else np.ones(noise.shape, bool)

@@ -16,16 +16,8 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from wildlab.geometry.frames import (
-    USUAL_GRAVITY,
-    Array,
-    Earth,
-    attraction,
-    euler_to_matrix,
-    flat_earth,
-    local_earth,
-    matrix_to_quaternion,
-)
+from wildlab.geometry.frames import USUAL_GRAVITY, Array, Earth, euler_to_matrix, flat_earth, local_earth
+from wildlab.simulation import kernels
 from wildlab.simulation.error_models import gauss_markov, rounded, stream, with_attitude_error
 from wildlab.simulation.parameters import Group, TwinParameters
 from wildlab.simulation.trajectory import (
@@ -35,7 +27,6 @@ from wildlab.simulation.trajectory import (
     angular_rates,
     attitude_along,
     band_limited_disturbance,
-    rates_between,
 )
 
 #: The n of a trajectory, by itself.
@@ -104,11 +95,10 @@ def ideal_imu(
     for first in range(0, count, _CHUNK):
         some = slice(first, min(first + _CHUNK, count))
         m = trajectory(np.arange(some.start - _ASIDE, some.stop + _ASIDE) / rate)
-        R, turning = m.R_nb, np.array(earth.rate)
-        to_b = np.swapaxes(R[inside], -1, -2)
-        felt = m.acceleration + 2 * np.cross(turning, m.velocity) - attraction(earth, m.position)
-        force[some] = np.einsum("nij,nj->ni", to_b, felt[inside])
-        spin[some] = rates_between(R[:-8], R[2:-6], R[6:-2], R[8:], step=2 / rate) + to_b @ turning
+        R = m.R_nb
+        kernels.body_rates(R[:-8], R[2:-6], R[6:-2], R[8:], 2 / rate, spin[some])
+        moving = (m.position[inside], m.velocity[inside], m.acceleration[inside])
+        kernels.felt_on_earth(R[inside], *moving, earth.as_array(), force[some], spin[some])
     return force, spin
 
 
@@ -143,13 +133,14 @@ def read_triad(true: ArrayLike, rate: float, sheet: TriadDataSheet, rng: np.rand
     -------
     (N, 3).
     """
-    x = np.asarray(true, float)
+    x = np.ascontiguousarray(true, float)
     triad = misaligned_triad(sheet.axis_misalignment, sheet.package_misalignment, rng)
     turn_on = sheet.turn_on_bias * rng.standard_normal(3)
     drift = gauss_markov(len(x), 1 / rate, [sheet.bias_stability] * 3, sheet.bias_time, rng)
-    noise = sheet.random_walk * np.sqrt(rate) * rng.standard_normal(x.shape)
-    read = rounded(x @ triad.T + turn_on + drift + noise, sheet.resolution)
-    return np.clip(read, -sheet.limit, sheet.limit)
+    noise = rng.standard_normal(x.shape)
+    limits = np.array([sheet.limit, sheet.resolution])
+    kernels.read_triad(x, triad, turn_on, drift, noise, float(sheet.random_walk * np.sqrt(rate)), limits)
+    return noise
 
 
 def triad_data_sheet(imu: Group, triad: str) -> TriadDataSheet:
@@ -199,7 +190,7 @@ def _swing(periods: Array) -> Array:
 
 def gimbal_table(gimbal: Group, duration: float, seed: int) -> pd.DataFrame:
     """What the gimbal says about its angles."""
-    times = sample_times(gimbal.rate.si, duration)
+    times = np.arange(math.floor(duration * gimbal.rate.si + 1e-9) + 1) / gimbal.rate.si
     pan, tilt = gimbal_angles(gimbal, times)
     error = gimbal.noise.si * stream(seed, "gimbal").standard_normal((2, len(times)))
     return pd.DataFrame({"time_s": times, "pan_rad": pan + error[0], "tilt_rad": tilt + error[1]})
@@ -251,7 +242,8 @@ def sample_times(rate: float, duration: float) -> Array:
 
 
 def nav_table(motion: Motion) -> pd.DataFrame:
-    q = matrix_to_quaternion(motion.R_nb)
+    q = np.empty((len(motion.times), 4))
+    kernels.quaternions(np.ascontiguousarray(motion.R_nb), q)
     columns = {"time_s": motion.times}
     columns |= {f"{axis}_m": motion.position[:, i] for i, axis in enumerate(("north", "east", "down"))}
     columns |= {f"q_{part}": q[:, i] for i, part in enumerate("wxyz")}

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from wildlab.geometry.frames import Array
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.landscape import ground_heights
-from wildlab.simulation.onboard_sensors import position_fixes, sample_times
+from wildlab.simulation.onboard_sensors import position_fixes
 from wildlab.simulation.parameters import Group, TwinParameters
 from wildlab.simulation.trajectory import Signal, band_limited_disturbance
 
@@ -83,7 +83,7 @@ def animal_paths(twin: TwinParameters, seed: int) -> dict[str, Signal]:
 
 def animals_truth(twin: TwinParameters, animals: Group, seed: int) -> pd.DataFrame:
     """Where each animal was at the rate of ``animals.rate``."""
-    times = sample_times(animals.rate.si, twin.flight.duration.si)
+    times = np.arange(int(twin.flight.duration.si * animals.rate.si + 1e-9) + 1) / animals.rate.si
     tables = []
     for name, path in animal_paths(twin, seed).items():
         position = path(times)
@@ -188,7 +188,7 @@ def truth_table(target: Group, duration: float, seed: int) -> pd.DataFrame:
     if gps is None or motion is None:
         times, position = np.array([np.nan]), path(np.zeros(1))
     else:
-        times = sample_times(gps.rate.si, duration)
+        times = np.arange(int(duration * gps.rate.si + 1e-9) + 1) / gps.rate.si
         course = motion.course.si
         antenna = path(times) + gps.ahead.si * np.array([np.cos(course), np.sin(course), 0.0])
         position = position_fixes(antenna, gps, stream(seed, f"gps of {name}"))

@@ -10,12 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from wildlab.geometry.frames import USUAL_GRAVITY, Array, euler_to_matrix, matrix_to_rotation_vector
+from wildlab.geometry.frames import USUAL_GRAVITY, Array, euler_to_matrix
+from wildlab.simulation import kernels
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.parameters import TwinParameters
 
@@ -32,22 +32,23 @@ class Disturbance:
 
     def __call__(self, times: ArrayLike) -> Array:
         """The signal. (N,) s -> (N,)."""
-        return np.asarray(np.sin(self._angles(times)) @ self.amplitudes)
+        return np.asarray(self._summed(times, 1)[0])
 
     def with_derivatives(self, times: ArrayLike) -> Array:
         """The signal and its first two derivatives with respect to time. (N,) s -> (3, N)."""
-        angles, slopes = self._angles(times), self.amplitudes * self.frequencies
-        sines = np.sin(angles)
-        return np.stack(
-            [sines @ self.amplitudes, np.cos(angles) @ slopes, -sines @ (slopes * self.frequencies)]
-        )
+        return self._summed(times, 3)
 
-    def _angles(self, times: ArrayLike) -> Array:
-        return np.multiply.outer(np.asarray(times, float), self.frequencies) + self.phases
+    def _summed(self, times: ArrayLike, rows: int) -> Array:
+        t = np.ascontiguousarray(times, float)
+        out = np.empty((rows, len(t)))
+        kernels.sum_of_sines(t, self.amplitudes, self.frequencies, self.phases, out)
+        return out
 
 
-#: The signal that is zero.
-NO_DISTURBANCE = Disturbance(np.zeros(1), np.ones(1), np.zeros(1))
+def no_disturbance() -> Disturbance:
+    """The signal that is zero."""
+    return Disturbance(np.zeros(1), np.ones(1), np.zeros(1))
+
 
 #: Roll, pitch and yaw (rad) about a body's own axes.
 AttitudeDisturbance = tuple[Disturbance, Disturbance, Disturbance]
@@ -102,14 +103,10 @@ def coordinated_attitude(
     -------
     ``R_nb`` (N, 3, 3).
     """
-    x = _unit(np.asarray(velocity, float) - wind)
-    y = _unit(np.cross(x, acceleration - np.array([0.0, 0.0, gravity])))
-    return np.asarray(np.stack([x, y, np.cross(x, y)], axis=-1) @ euler_to_matrix(0.0, trim_pitch, 0.0))
-
-
-def _unit(vectors: NDArray[Any]) -> Array:
-    """(N, 3), each of length one."""
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
+    v, a = (np.ascontiguousarray(part, float) for part in (velocity, acceleration))
+    R = np.empty((len(v), 3, 3))
+    kernels.coordinated_attitude(v, a, np.array(wind, float), float(trim_pitch), float(gravity), R)
+    return R
 
 
 def fixed_wing_trajectory(
@@ -136,21 +133,12 @@ def fixed_wing_trajectory(
     Times (N,) s -> `Motion`.
     """
 
-    def attitude(t: Array, v: Array, a: Array) -> Array:
-        return coordinated_attitude(v, a, wind=wind, trim_pitch=trim_pitch, gravity=gravity)
-
-    return _along(path, attitude, gusts)
-
-
-def _along(
-    path: FlightPath, attitude: Callable[[Array, Array, Array], Array], gusts: AttitudeDisturbance | None
-) -> Trajectory:
-    """Motion with an attitude by times, velocities and accelerations, and gusts about it."""
-
     def motion(times: Array) -> Motion:
         t = np.asarray(times, float)
         p, v, a = path(t)
-        calm = Motion(t, p, v, a, attitude(t, v, a))
+        calm = Motion(
+            t, p, v, a, coordinated_attitude(v, a, wind=wind, trim_pitch=trim_pitch, gravity=gravity)
+        )
         return calm if gusts is None else turned(calm, gusts)
 
     return motion
@@ -187,14 +175,20 @@ def thrust_aligned_trajectory(
     Times (N,) s -> `Motion`.
     """
 
-    def attitude(t: Array, v: Array, a: Array) -> Array:
-        z = _unit(np.array([0.0, 0.0, 1.0]) - a / gravity)
+    def motion(times: Array) -> Motion:
+        t = np.asarray(times, float)
+        p, v, a = path(t)
+        z = np.array([0.0, 0.0, 1.0]) - a / gravity
+        z /= np.linalg.norm(z, axis=-1, keepdims=True)
         nose = heading(t)
         ahead = np.stack([np.cos(nose), np.sin(nose), np.zeros(len(t))], axis=-1)
-        y = _unit(np.cross(z, ahead))
-        return np.asarray(np.stack([np.cross(y, z), y, z], axis=-1) @ euler_to_matrix(0.0, trim_pitch, 0.0))
+        y = np.cross(z, ahead)
+        y /= np.linalg.norm(y, axis=-1, keepdims=True)
+        R = np.stack([np.cross(y, z), y, z], axis=-1) @ euler_to_matrix(0.0, trim_pitch, 0.0)
+        calm = Motion(t, p, v, a, R)
+        return calm if gusts is None else turned(calm, gusts)
 
-    return _along(path, attitude, gusts)
+    return motion
 
 
 #: Samples of the bank per second, Hz: many within the two seconds that an airframe takes to roll.
@@ -220,6 +214,11 @@ def recent_change(values: ArrayLike, step: float, memory: float) -> Array:
     -------
     (N,), in the unit of the values.
 
+    Raises
+    ------
+    ValueError
+        Where ``step`` or ``memory`` is not positive.
+
     Examples
     --------
     >>> recent_change([0.0, 0.0, 1.0], 0.1, 10.0)[:2]
@@ -227,6 +226,8 @@ def recent_change(values: ArrayLike, step: float, memory: float) -> Array:
     """
     from scipy.signal import lfilter  # brings scipy.stats along, which takes long
 
+    if not (step > 0 and memory > 0):
+        raise ValueError("step and memory must be positive")
     x = np.asarray(values, float)
     if not len(x):
         return x.copy()
@@ -287,7 +288,10 @@ def camera_motion(twin: TwinParameters, trajectory: Trajectory, times: Array, se
     sway = camera_sway(twin, trajectory, seed)
     if sway is None:
         return motion
-    return replace(motion, R_nb=motion.R_nb @ euler_to_matrix(*sway(times).T))
+    roll, pitch, yaw = (np.ascontiguousarray(angle) for angle in sway(times).T)
+    R = np.empty_like(motion.R_nb)
+    kernels.turn(np.ascontiguousarray(motion.R_nb), roll, pitch, yaw, R)
+    return replace(motion, R_nb=R)
 
 
 #: Times (N,) in s -> position, velocity, acceleration in n, (N, 3) each, in m, m/s, m/s^2.
@@ -323,8 +327,10 @@ Trajectory = Callable[[Array], Motion]
 
 def turned(motion: Motion, disturbance: AttitudeDisturbance) -> Motion:
     """The motion of a body in the same place, turned about the axes of the first one by small angles."""
+    R = np.empty_like(motion.R_nb)
     roll, pitch, yaw = (angle(motion.times) for angle in disturbance)
-    return replace(motion, R_nb=motion.R_nb @ euler_to_matrix(roll, pitch, yaw))
+    kernels.turn(np.ascontiguousarray(motion.R_nb), roll, pitch, yaw, R)
+    return replace(motion, R_nb=R)
 
 
 def attitude_along(trajectory: Trajectory) -> Signal:
@@ -362,16 +368,10 @@ def angular_rates(attitude: Signal, times: ArrayLike, step: float = 0.01) -> Arr
     (N, 3) rad/s, in b.
     """
     t = np.asarray(times, float)
-    return rates_between(*(attitude(t + steps * step) for steps in (-2, -1, 1, 2)), step=step)
-
-
-def rates_between(far_before: Array, before: Array, after: Array, far_after: Array, *, step: float) -> Array:
-    """Angular rate in b, (N, 3), half-way between attitudes a ``step`` (s) and two away, to fourth order."""
-    near, far = (
-        matrix_to_rotation_vector(np.swapaxes(first, -1, -2) @ last)
-        for first, last in ((before, after), (far_before, far_after))
-    )
-    return np.asarray((4 * near / (2 * step) - far / (4 * step)) / 3)
+    rates = np.empty((len(t), 3))
+    R = [np.ascontiguousarray(attitude(t + steps * step)) for steps in (-2, -1, 1, 2)]
+    kernels.body_rates(R[0], R[1], R[2], R[3], step, rates)
+    return rates
 
 
 def specific_forces(motion: Motion, gravity: float = USUAL_GRAVITY) -> Array:

@@ -27,11 +27,12 @@ from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.reporting.charts.drawing import Values, draw_picture, lines_chart
 from wildlab.reporting.figures import GREY, INK, ORANGE, new_figure
 from wildlab.reporting.published import bounds_of, spread_key
+from wildlab.simulation.camera_detections import marks, numbered
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.scene.coloured import ColourView, Ground, Tarpaulin, render_colour
 from wildlab.simulation.scene.flights import SceneFlight
-from wildlab.simulation.twins import marks, numbered, simulate_twin
+from wildlab.simulation.twins import simulate_twin
 
 #: What is found in the images, single positions, their mean, and images that show the horizon.
 FOUND, SINGLE, MEAN, HORIZON = "tarpaulin", "single", "mean", "horizon"

@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from wildlab.geometry.camera import Camera, normalise
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import ground_to_pixel
+from wildlab.simulation.camera_detections import visible_part
 from wildlab.simulation.scene.render import check_above, pixel_coordinates
-from wildlab.simulation.twins import visible_part
 
 Colour = tuple[float, float, float]
 

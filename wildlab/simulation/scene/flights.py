@@ -15,6 +15,7 @@ from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import ground_to_pixel
+from wildlab.simulation.camera_detections import Exposures, exposure_times, visible_part
 from wildlab.simulation.courses import twin_trajectory
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.manifest import as_flown
@@ -31,7 +32,6 @@ from wildlab.simulation.scene.render import (
 )
 from wildlab.simulation.target_motion import target_path
 from wildlab.simulation.trajectory import camera_motion
-from wildlab.simulation.twins import Exposures, exposure_times, visible_part
 
 #: Largest count of 14 bits.
 LARGEST = 2**14 - 1

@@ -23,14 +23,7 @@ from scipy import fft
 from wildlab.geometry.camera import Camera, normalise
 from wildlab.geometry.frames import Array
 from wildlab.simulation.scene import kernels
-from wildlab.simulation.scene.render import (
-    Body,
-    SeenBody,
-    check_above,
-    draw_bodies,
-    pixel_coordinates,
-    random_field,
-)
+from wildlab.simulation.scene.render import Body, SeenBody, check_above, draw_bodies, pixel_coordinates
 
 Tile = NDArray[np.float32]
 
@@ -243,11 +236,14 @@ def rolling_land(weather: Weather, seed: int = 0) -> Land:
     >>> [round(float((land.cover == one).mean()), 1) for one in range(3)]
     [0.7, 0.2, 0.1]
     """
-    high = random_field(64, lambda square: np.exp(-square / (2 * 2.5**2)) * (square > 0), [seed, 1])
+    k = fft.fftfreq(64) * 64
+    size2 = k[:, None] ** 2 + k[None, :] ** 2
+    noise = np.random.default_rng([seed, 1]).standard_normal((64, 64))
+    high = fft.ifft2(np.exp(-size2 / (2 * 2.5**2)) * (size2 > 0) * fft.fft2(noise)).real
     field_of_patches = smooth_tile(512, 20.0, seed + 1000)
     edges = np.quantile(field_of_patches, np.cumsum(SHARES)[:2])
     cover = np.searchsorted(edges, field_of_patches)
-    return Land(RELIEF_M * high, cover, weather=weather, seed=seed)
+    return Land(RELIEF_M * high / high.std(), cover, weather=weather, seed=seed)
 
 
 #: How much colder than the air a clear sky is, and a closed cover of clouds, K.

@@ -14,7 +14,7 @@ warmer than the sea by ``excess`` K, with a texture and hot places; cold ones ha
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import NamedTuple
@@ -28,8 +28,8 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera, normalise
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import ground_to_pixel
+from wildlab.simulation.camera_detections import moments, visible_part
 from wildlab.simulation.scene import kernels
-from wildlab.simulation.twins import moments, visible_part
 
 #: Side (m) and cells along it of the tiles of waves, of ripples, and of patches.
 WAVES, RIPPLES, PATCHES = (256.0, 512), (16.0, 256), (512.0, 128)
@@ -344,20 +344,13 @@ def tiles_of(sea: Sea) -> Tiles:
 
 @lru_cache(maxsize=8)
 def _patches(sd: float, seed: int) -> Tile:
-    field = random_field(PATCHES[1], lambda square: (square > 0) / (1 + square), [seed, 7])
-    return np.asarray(sd * field, np.float32)
-
-
-def random_field(cells: int, amplitude: Callable[[Array], Array], seed: list[int]) -> Array:
-    """A tile (cells, cells) that repeats, of unit deviation.
-
-    ``amplitude`` is by the square of the waves per side.
-    """
+    cells = PATCHES[1]
     k = fft.fftfreq(cells) * cells
-    square = k[:, None] ** 2 + k[None, :] ** 2
-    noise = np.random.default_rng(seed).standard_normal((cells, cells))
-    field = fft.ifft2(amplitude(square) * fft.fft2(noise)).real
-    return np.asarray(field / field.std())
+    size2 = k[:, None] ** 2 + k[None, :] ** 2
+    spectrum = np.where(size2 > 0, 1 / (1 + size2), 0.0)
+    rng = np.random.default_rng([seed, 7])
+    field = fft.ifft2(spectrum * fft.fft2(rng.standard_normal((cells, cells)))).real
+    return np.asarray(sd * field / field.std(), np.float32)
 
 
 #: Pixels around a body's projected outlines that are looked at too.
@@ -606,8 +599,13 @@ def _sun(sea: Sea) -> Array:
 @lru_cache(maxsize=64)
 def _texture(seed: int) -> NDArray[np.float32]:
     """An uneven surface of unit variance (n, n), a few cells coarse, that repeats."""
-    field = random_field(_TEXTURE, lambda square: np.exp(-square / (2 * 9.0**2)), [seed, 3])
-    return np.asarray(field, np.float32)
+    rng = np.random.default_rng([seed, 3])
+    k = np.fft.fftfreq(_TEXTURE) * _TEXTURE
+    size2 = k[:, None] ** 2 + k[None, :] ** 2
+    field = np.fft.ifft2(
+        np.exp(-size2 / (2 * 9.0**2)) * np.fft.fft2(rng.standard_normal((_TEXTURE,) * 2))
+    ).real
+    return np.asarray(field / field.std(), np.float32)
 
 
 def _frame(body: Body) -> Array:
