@@ -8,14 +8,15 @@ at at once, and lines of sight are exact.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.ndimage import maximum_filter, minimum_filter
 
-from wildlab.geometry.camera import Camera, in_image, normalise, project
+from wildlab.geometry.camera import Camera, normalise
 from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.compilation import announced, compiled
 from wildlab.geometry.frames import Array, Indices, Mask
 from wildlab.geometry.georeference import Terrain
 from wildlab.geometry.viewsheds import image_border, lines_clear, widest_view
@@ -195,23 +196,22 @@ def see(
     [121 121]
     """
     p, R = np.asarray(poses.p_nc, float), np.asarray(poses.R_nc, float)
-    camera, widest = poses.camera, widest_view(poses.camera) * (1 + 1e-9)
-    none = np.empty(0, np.intp)
-    shown = [(none, none, np.empty(0), np.empty((0, 3)))]
-    for k, (begin, size) in enumerate(zip(*_blocks(terrain, camera, p, R, furthest), strict=True)):
-        i, j = (one.ravel() + at for one, at in zip(np.indices(size), begin, strict=True))
-        points = np.stack(
-            [terrain.north + terrain.step * i, terrain.east + terrain.step * j, -terrain.height[i, j]],
-            axis=-1,
+    first, count = _blocks(terrain, poses.camera, p, R, furthest)
+    # Compiled functions are imported where they are called: a compiler takes its time to be imported.
+
+    camera = poses.camera
+    lens = np.array(
+        [
+            *(camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy, camera.skew),
+            *(*camera.distortion, widest_view(camera) * (1 + 1e-9)),
+        ],
+        float,
+    )
+    grid = np.array([terrain.north, terrain.east, terrain.step])
+    with announced("the view over terrain"):
+        image, node, distance, points = in_images(
+            terrain.height, grid, lens, first, count, p.copy(), R.copy(), furthest
         )
-        offset = points - p[k]
-        distance, (x, y, z) = np.linalg.norm(offset, axis=1), (offset @ R[k]).T
-        # Far outside of the image a lens's polynomial may fold back into it.
-        inside = (distance <= furthest) & (np.hypot(x, y) <= widest * z)
-        inside[inside] = in_image(camera, project(camera, offset[inside] @ R[k]))
-        node = (i * terrain.height.shape[1] + j)[inside]
-        shown.append((np.full(len(node), k), node, distance[inside], points[inside]))
-    image, node, distance, points = (np.concatenate(part) for part in zip(*shown, strict=True))
     found = Sightings(image, node, distance)
     if not hidden or not len(node):
         return found
@@ -374,3 +374,74 @@ def _anywhere(corners: Array, count: int, rng: np.random.Generator) -> Array:
         tried = rng.uniform(low, high, (2 * count + 10, 2))
         found = np.concatenate([found, tried[contains(corners, tried)]])
     return found[:count]
+
+
+@compiled
+def edge_of(lens: Any, x: float, y: float, z: float) -> float:
+    """How far a point of c is inside the image, pixels; negative outside of it.
+
+    ``lens`` holds width, height, fx, fy, cx, cy, skew, k1, k2, p1, p2, k3 and the tangent of the outermost
+    angle that the image shows: far outside the image a lens's polynomial may fold back into it.
+    """
+    if not z > 0:
+        return -1.0
+    a, b = x / z, y / z
+    r2 = a * a + b * b
+    if not r2 <= lens[12] * lens[12]:
+        return -1.0
+    radial = 1 + r2 * (lens[7] + r2 * (lens[8] + r2 * lens[11]))
+    p = a * radial + 2 * lens[9] * a * b + lens[10] * (r2 + 2 * a * a)
+    q = b * radial + lens[9] * (r2 + 2 * b * b) + 2 * lens[10] * a * b
+    u, v = lens[2] * p + lens[6] * q + lens[4], lens[3] * q + lens[5]
+    return float(min(u, lens[0] - u, v, lens[1] - v))
+
+
+@compiled
+def in_images(
+    height: Any, grid: Any, lens: Any, first: Any, count: Any, p: Any, R: Any, furthest: float
+) -> Any:
+    """Nodes within each image's block that are in the image and not too far.
+
+    ``grid`` is north and east of the first node, and the step. Image, node, distance, points (S, 3).
+    """
+    room = 1024
+    image, node = np.empty(room, np.int64), np.empty(room, np.int64)
+    distance, points = np.empty(room), np.empty((room, 3))
+    n = 0
+    columns = height.shape[1]
+    for k in range(len(p)):
+        for i in range(first[k, 0], first[k, 0] + count[k, 0]):
+            for j in range(first[k, 1], first[k, 1] + count[k, 1]):
+                north, east = grid[0] + grid[2] * i, grid[1] + grid[2] * j
+                down = -np.float64(height[i, j])
+                dx, dy, dz = north - p[k, 0], east - p[k, 1], down - p[k, 2]
+                far = np.sqrt(dx * dx + dy * dy + dz * dz)
+                if not far <= furthest:
+                    continue
+                inside = edge_of(
+                    lens,
+                    R[k, 0, 0] * dx + R[k, 1, 0] * dy + R[k, 2, 0] * dz,
+                    R[k, 0, 1] * dx + R[k, 1, 1] * dy + R[k, 2, 1] * dz,
+                    R[k, 0, 2] * dx + R[k, 1, 2] * dy + R[k, 2, 2] * dz,
+                )
+                if not inside >= 0:
+                    continue
+                if n == room:
+                    room *= 2
+                    image, node = grown(image, room), grown(node, room)
+                    distance = grown(distance, room)
+                    more = np.empty((room, 3))
+                    more[:n] = points
+                    points = more
+                image[n], node[n], distance[n] = k, i * columns + j, far
+                points[n, 0], points[n, 1], points[n, 2] = north, east, down
+                n += 1
+    return image[:n], node[:n], distance[:n], points[:n]
+
+
+@compiled
+def grown(values: Any, room: int) -> Any:
+    """The same with more room at its end."""
+    more = np.empty(room, values.dtype)
+    more[: len(values)] = values
+    return more
