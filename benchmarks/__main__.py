@@ -20,13 +20,12 @@ from benchmarks import (
     simulation,
     terrain,
     tracking,
-    turns,
     warm,
 )
 
 BASELINE = Path(__file__).with_name("baseline.json")
 EVERY = (
-    *(pixel_to_plane, turns, terrain, navigation, tracking, many, particles, simulation, warm, floating),
+    *(pixel_to_plane, terrain, navigation, tracking, many, particles, simulation, warm, floating),
     long_flight,
 )
 

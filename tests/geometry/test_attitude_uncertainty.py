@@ -17,7 +17,7 @@ from wildlab.geometry.covariances import (
 )
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import Terrain
-from wildlab.geometry.uncertainty import PoseErrors, ground_covariance, terrain_covariance
+from wildlab.geometry.uncertainty import PoseErrors, ground_covariance
 
 FOCAL, MIDDLE, HEIGHT = 800.0, (1000.0, 750.0), 60.0
 CAMERA = Camera(2000, 1500, FOCAL, FOCAL, *MIDDLE)
@@ -134,7 +134,7 @@ def ellipse(pitch: float, yaw: float, pixel: np.ndarray, kind: str, terrain: Ter
     rng = np.random.default_rng(5)
     if terrain is None:
         return ground_covariance(pose, pixel, 0.0, errors, rng).covariance[0]
-    return terrain_covariance(pose, pixel[None], terrain, errors, rng).covariance[0]
+    return ground_covariance(pose, pixel[None], terrain, errors, rng).covariance[0]
 
 
 def coverage(pitch: float, kind: str, on_hills: bool) -> tuple[float, np.ndarray]:

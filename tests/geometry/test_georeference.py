@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import Mount, camera_pose, camera_rotation
 from wildlab.geometry.frames import euler_to_matrix
-from wildlab.geometry.georeference import BLOCK, ground_to_pixel, intersect_plane, pixel_rays, pixel_to_plane
+from wildlab.geometry.georeference import ground_to_pixel, pixel_to_plane
 from wildlab.studies.sensitivity import TAU2
 
 WIDE = Camera(640, 512, 500.0, 505.0, 322.0, 250.0, 1.5, (-0.2, 0.05, 0.001, -0.002, 0.0))
@@ -90,23 +90,6 @@ def test_pan_and_tilt_follow_the_printed_gimbal_matrix():
     moving = camera_rotation(Mount("down"), np.array([pan, 0.0]), np.array([tilt, 0.0]))
     assert np.allclose(moving[0], (R_cm @ R_mb).T)
     assert np.allclose(moving[1], R_cm.T)
-
-
-def test_blocks_of_columns_are_the_plain_intersection():
-    """Over more than two blocks, with a pose per pixel and with one for all, misses included."""
-    rng = np.random.default_rng(0)
-    n = 2 * BLOCK + 17
-    uv = rng.uniform([0, 0], [640, 512], (n, 2))
-    R = euler_to_matrix(rng.normal(0, 0.1, n), rng.uniform(-1.5, 0.1, n), rng.uniform(-3, 3, n))
-    each = camera_pose(Mount("forward"), rng.uniform([-50, -50, -150], [50, 50, 5], (n, 3)), R)
-    one = camera_pose(Mount("forward"), np.array([1.0, 2.0, -90.0]), R[0])
-    for pose, plane in ((each, rng.uniform(-3, 3, n)), (each, 1.0), (one, 0.0), (one, rng.uniform(-3, 3, n))):
-        plain = intersect_plane(pixel_rays(WIDE, uv, pose[1]), pose[0], plane)
-        blocks = pixel_to_plane(WIDE, uv, *pose, plane)
-        assert np.array_equal(np.isnan(plain), np.isnan(blocks))
-        seen = np.abs(plain[:, 0]) < 1e5
-        assert np.allclose(plain[seen], blocks[seen], rtol=1e-11, atol=1e-9)
-        assert 0 < np.isnan(plain).any(axis=1).mean() < 1 or pose is one
 
 
 def test_a_camera_below_the_plane_sees_nothing_of_it():

@@ -16,8 +16,7 @@ from wildlab.geometry.georeference import Terrain, pixels_to_terrain
 from wildlab.geometry.uncertainty import (
     PoseErrors,
     ground_covariance,
-    sample_terrain,
-    terrain_covariance,
+    sample_ground,
     terrain_jacobians,
 )
 
@@ -94,7 +93,7 @@ def _place(terrain: Terrain) -> tuple[float, float, float]:
 def test_on_level_ground_it_is_what_a_plane_gives():
     terrain, uv = sloping(0.0, 0.0), np.array([[100.0, 50.0], [320.0, 256.0], [600.0, 500.0]])
     pose, e = looking(55.0, 120.0), errors()
-    found = terrain_covariance(pose, uv, terrain, e, np.random.default_rng(0))
+    found = ground_covariance(pose, uv, terrain, e, np.random.default_rng(0))
     expected = ground_covariance(pose, uv, 0.0, e, np.random.default_rng(0))
     np.testing.assert_allclose(found.covariance, expected.covariance, rtol=1e-9)
     assert list(found.method) == ["linear"] * 3
@@ -104,7 +103,7 @@ def test_samples_are_those_of_each_error_by_itself():
     """One pixel, one pose, one terrain at a time: raised, turned and moved as the draws say."""
     rng = np.random.default_rng(3)
     terrain, pose, uv, e = hills(rng, 3.0), looking(45.0, 90.0), np.array([200.0, 300.0]), errors()
-    found = sample_terrain(pose, uv, terrain, e, np.random.default_rng(7), 20)
+    found = sample_ground(pose, uv, terrain, e, np.random.default_rng(7), 20)
     draws = np.random.default_rng(7)
     off = draws.multivariate_normal(np.zeros(6), e.pose, 20)
     turn = draws.multivariate_normal(np.zeros(3), e.mount, 20)
@@ -134,9 +133,9 @@ def test_ellipses_hold_nine_tenths_of_samples_on_slopes(rough, flattest):
                 east=at[1],
             )  # fmt: skip
             e, uv = errors(rng.uniform(0.3, 2.0), rng.uniform(0.2, 2.0)), rng.uniform([0, 0], [640, 512])
-            found = terrain_covariance(pose, uv[None], terrain, e, rng)
+            found = ground_covariance(pose, uv[None], terrain, e, rng)
             if np.isfinite(found.covariance).all():
-                others = sample_terrain(pose, uv, terrain, e, np.random.default_rng([seed, k, 9]), 2000)
+                others = sample_ground(pose, uv, terrain, e, np.random.default_rng([seed, k, 9]), 2000)
                 centre = pixels_to_terrain(pose, uv[None], terrain).points[0, :2]
                 inside.append(inside_ellipse(others[:, :2] - centre, found.covariance[0]).mean())
     assert len(inside) > 60

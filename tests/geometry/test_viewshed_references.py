@@ -1,4 +1,4 @@
-"""Viewsheds of a real terrain beside those of GRASS and GDAL, where the data are at hand."""
+"""Lines of sight; viewsheds of real terrain beside those of GRASS and GDAL, where the data are at hand."""
 
 import json
 
@@ -36,6 +36,13 @@ def references(shared_data):
         ]
         found[name] = (terrain, nodes, camera, one["target_height"], *seen)
     return found
+
+
+def test_no_line_leads_to_what_is_not_known():
+    terrain = Terrain(np.random.default_rng(1).uniform(0, 6, (24, 24)).astype(np.float32), -23.0, -31.0, 2.0)
+    points = np.array([[0.0, 0.0, -50.0], [np.nan, 0.0, -50.0], [0.0, 0.0, -50.0]])
+    lenses = [[0.0, 5.0, -60.0], [0.0, 5.0, -60.0], [np.nan, 0.0, 0.0]]
+    assert lines_clear(terrain, points, lenses).tolist() == [True, False, False]
 
 
 def test_the_exact_line_of_sight_is_that_of_grass(references):

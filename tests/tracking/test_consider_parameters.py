@@ -94,7 +94,7 @@ def test_sets_of_errors_join_and_split():
         ),
         (
             lambda: errors_of(Considered(("heading",), -np.eye(1)), bearings([0, 0], 0.0), 3),
-            "variance -1",
+            r"covariance\[0\]: ",
         ),
     ],
 )

@@ -25,9 +25,8 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.corrections import Calibration, PosesAt, calibrated_poses
 from wildlab.geometry.covariances import ellipse_axes, inside_ellipse, pose_covariance
 from wildlab.geometry.frames import Array, Indices, Mask, ned_to_geodetic
-from wildlab.geometry.georeference import Terrain, georeference_pixels, pixels_to_terrain
-from wildlab.geometry.rays import RAY_STATUS
-from wildlab.geometry.uncertainty import PoseErrors, ground_covariance, terrain_covariance
+from wildlab.geometry.georeference import RAY_STATUS, Terrain, georeference_pixels, pixels_to_terrain
+from wildlab.geometry.uncertainty import PoseErrors, ground_covariance
 
 #: Standard deviations assumed where neither the log nor the manifest states one; those of the attitude as in
 #: `wildlab.geometry.covariances`.
@@ -290,19 +289,15 @@ def georeference(
     DataFrame
         The table of the observations with ``north_m``, ``east_m``, ``down_m``, the covariance ``cov_nn``,
         ``cov_ne``, ``cov_ee`` (m2) and ``ellipse`` (how the covariance was found). Over terrain also ``ray``:
-        what became of it, in the words of `wildlab.geometry.rays.RAY_STATUS`.
+        what became of it, in the words of `wildlab.geometry.georeference.RAY_STATUS`.
     """
     o = observations
     if errors is None:
         errors = pose_errors(o)
-    met = None
-    if o.terrain is not None:
-        met = pixels_to_terrain(o.poses, o.uv, o.terrain)
-        ground = met.points
-        covariance, method = terrain_covariance(o.poses, o.uv, o.terrain, errors, rng, met)
-    else:
-        ground = georeference_pixels(o.poses, o.uv, o.plane_down)
-        covariance, method = ground_covariance(o.poses, o.uv, o.plane_down, errors, rng)
+    met = None if o.terrain is None else pixels_to_terrain(o.poses, o.uv, o.terrain)
+    ground = georeference_pixels(o.poses, o.uv, o.plane_down) if met is None else met.points
+    surface = o.plane_down if o.terrain is None else o.terrain
+    covariance, method = ground_covariance(o.poses, o.uv, surface, errors, rng, met)
     more = {} if met is None else {"ray": [RAY_STATUS[int(one)] for one in met.became]}
     return o.table.assign(
         north_m=ground[:, 0],

@@ -14,8 +14,7 @@ from numpy.typing import ArrayLike
 from wildlab.errors import WildlabError
 from wildlab.flight.schema import COVARIANCE_COLUMNS, POSITION, QUATERNION
 from wildlab.flight.store import Flight
-from wildlab.geometry.frames import Array, Indices, quaternion_to_matrix
-from wildlab.geometry.kernels import between_attitudes
+from wildlab.geometry.frames import Array, Indices, between_attitudes, quaternion_to_matrix
 
 #: Stretches without a sample up to this long are bridged by interpolation, unless the caller says otherwise;
 #: longer ones where the log's own rate explains them, up to so many of its usual steps: none is missing.

@@ -161,12 +161,30 @@ def undistort(xy_distorted: ArrayLike, distortion: ArrayLike, tolerance: float =
     -------
     (N, 2).
     """
-    from wildlab.geometry.kernels import undistort_rows  # the compiler takes a while to load
+    target = np.asarray(xy_distorted, float)
+    wanted = target.reshape(-1, 2)
+    xy, going = wanted.copy(), np.arange(len(wanted))
+    with np.errstate(all="ignore"):
+        for _ in range(50):
+            miss = distort(xy[going], distortion) - wanted[going]
+            far = np.abs(miss).max(axis=1) > tolerance
+            going, miss = going[far], miss[far]
+            if not len(going):
+                break
+            J, determinant = _with_determinant(xy[going], distortion)
+            step = np.stack([J[:, 1, 1], J[:, 0, 0]], axis=1) * miss - J[:, 0, 1:] * miss[:, ::-1]
+            step /= determinant[:, None]
+            # A long step would leap over the fold of the polynomial.
+            xy[going] -= step * np.minimum(1.0, 0.3 / np.linalg.norm(step, axis=1))[:, None]
+        J, determinant = _with_determinant(xy, distortion)
+        miss = np.abs(distort(xy, distortion) - wanted).max(axis=1)
+    good = (determinant > 0) & (J[:, 0, 0] > 0) & (miss <= max(tolerance, 1e-12))
+    return np.where(good[:, None], xy, np.nan).reshape(target.shape)
 
-    xy = np.array(xy_distorted, float)
-    k1, k2, p1, p2, k3 = np.asarray(distortion, float)
-    undistort_rows(xy.reshape(-1, 2), k1, k2, p1, p2, k3, tolerance)
-    return xy
+
+def _with_determinant(xy: Array, distortion: ArrayLike) -> tuple[Array, Array]:
+    J = distortion_jacobian(xy, distortion)
+    return J, J[:, 0, 0] * J[:, 1, 1] - J[:, 0, 1] ** 2
 
 
 def undistort_approximately(xy_distorted: ArrayLike, k1: float) -> Array:

@@ -186,7 +186,7 @@ class CameraPoses:
 
     Raises
     ------
-    WildlabError
+    ValueError
         Where a field has another shape or another number of rows than the others.
 
     Examples
@@ -247,7 +247,7 @@ class CameraPoses:
 
         Raises
         ------
-        WildlabError
+        ValueError
             Where a field has another shape or another number of rows than the others.
 
         Examples
@@ -258,9 +258,6 @@ class CameraPoses:
         ()
         """
         turn, lever = np.asarray(R_bc, float), np.asarray(lever_arm, float)
-        for name, values, shape in (("R_bc", turn, (3, 3)), ("lever_arm", lever, (3,))):
-            if values.shape != shape:
-                raise _misshapen(name, values, shape)
         given = _aligned({"p_nc": p_nc, "R_nc": R_nc, "covariance": covariance})
         p, R = given["p_nc"], given["R_nc"]
         roll, lean, pan = (float(angle) for angle in matrix_to_euler(turn @ R_MC_DOWN.T))
@@ -373,26 +370,10 @@ class CameraPoses:
 def _aligned(given: Mapping[str, ArrayLike | None]) -> dict[str, Array]:
     """Fields as arrays with the same rows; those that are not given are left out."""
     arrays = {name: np.asarray(values, float) for name, values in given.items() if values is not None}
-    rows: tuple[int, ...] = ()
-    whose = ""
-    for name, values in arrays.items():
-        each = _EACH[name]
-        lead = values.shape[: max(values.ndim - len(each), 0)]
-        if values.shape[len(lead) :] != each:
-            raise _misshapen(name, values, each)
-        if lead and rows and lead != rows:
-            raise WildlabError(
-                f"{_count(lead)} beside {_count(rows)} of {whose}",
-                "give one value for each row, or one for all rows",
-                field=name,
-            )
-        if lead and not rows:
-            rows, whose = lead, name
+    rows = np.broadcast_shapes(
+        *(values.shape[: values.ndim - len(_EACH[name])] for name, values in arrays.items())
+    )
     return {name: np.broadcast_to(values, (*rows, *_EACH[name])) for name, values in arrays.items()}
-
-
-def _misshapen(name: str, values: Array, each: tuple[int, ...]) -> WildlabError:
-    return WildlabError(f"an array of the shape {values.shape}", f"give {each} for each row", field=name)
 
 
 def _count(rows: tuple[int, ...]) -> str:

@@ -76,20 +76,18 @@ def _file_digest(file: str) -> str:
 
 
 class _Announcer(event.Listener):
-    def __init__(self, what: str) -> None:
-        self.what: str | None = what
+    """Says once that something has to be compiled."""
+
+    said = False
 
     def on_start(self, event: Any) -> None:
-        if self.what is not None:
-            LOGGER.info("compiling %s for this machine; this is kept, the next run starts at once", self.what)
-            self.what = None
+        if not self.said:
+            LOGGER.info("compiling for this machine; this is kept, the next run starts at once")
+            self.said = True
 
     def on_end(self, event: Any) -> None:
         """Nobody asks how long it took."""
 
 
-@contextmanager
-def announced(what: str) -> Iterator[None]:
-    """Log one line where what is called inside has to be compiled first; none where it is there already."""
-    with event.install_listener("numba:compile", _Announcer(what)):
-        yield
+ANNOUNCER = _Announcer()
+event.register("numba:compile", ANNOUNCER)  # type: ignore[no-untyped-call]

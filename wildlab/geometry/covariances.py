@@ -209,61 +209,25 @@ def check_covariance(P: Array, field: str) -> None:
     Raises
     ------
     WildlabError
-        Naming the field, the first matrix of several that is wrong, and what is wrong with it.
+        Naming the field, and the first matrix of several that is wrong.
     """
     P = np.asarray(P, float)
-    if _all_covariances(P):
-        return
-    for index, one in enumerate(P[None] if P.ndim == 2 else P):
-        problem = _wrong_with(one)
-        if problem:
-            raise WildlabError(
-                problem,
-                "give a covariance: finite, symmetric, no variance below zero",
-                field=field if P.ndim == 2 else f"{field}[{index}]",
-            )
-
-
-def _per_sd(P: Array) -> Array:
-    """In units of the standard deviations, so that metres and radians weigh alike."""
-    variances = np.diagonal(P, axis1=-2, axis2=-1)
-    unit = np.sqrt(np.where(variances > 0, variances, 1.0))
-    return np.asarray(P / (unit[..., :, None] * unit[..., None, :]))
-
-
-def _all_covariances(P: Array) -> bool:
-    """All at once, since a study may start thousands of runs."""
-    if not np.isfinite(P).all():
-        return False
-    largest = np.abs(P).max(axis=(-2, -1), keepdims=True, initial=0.0)
-    if (np.abs(P - np.swapaxes(P, -1, -2)) > ROUNDING * largest).any():
-        return False
-    values = np.linalg.eigvalsh(_per_sd(P))
-    least = -ROUNDING * np.maximum(values[..., -1], 1.0)
-    return bool((np.diagonal(P, axis1=-2, axis2=-1) >= 0).all() and (values[..., 0] >= least).all())
-
-
-def _wrong_with(P: Array) -> str:
-    """What keeps a matrix (n, n) from being a covariance; nothing where it is one."""
-    if _all_covariances(P):
-        return ""
-    finite = np.isfinite(P).all(axis=1)
-    if not finite.all():
-        row = int(np.argmin(finite))
-        return f"row {row} is not finite: {P[row].tolist()}"
-    uneven = np.argwhere(np.abs(P - P.T) > ROUNDING * np.abs(P).max())
-    if len(uneven):
-        row, column = uneven[0]
-        return (
-            f"not symmetric: row {row}, column {column} has {P[row, column]:g}, the other way round "
-            f"{P[column, row]:g}"
+    many = P.reshape(-1, *P.shape[-2:])
+    largest = np.abs(many).max(axis=(1, 2), keepdims=True, initial=0.0)
+    even = np.isfinite(many) & (np.abs(many - np.swapaxes(many, 1, 2)) <= ROUNDING * largest)
+    good = even.all(axis=(1, 2)) & (np.diagonal(many, axis1=1, axis2=2) >= 0).all(axis=1)
+    # In units of the standard deviations, so that metres and radians weigh alike.
+    sizes = np.sqrt(np.diagonal(np.where(good[:, None, None], many, 1.0), axis1=1, axis2=2))
+    sizes = np.where(sizes > 0, sizes, 1.0)
+    scaled = np.where(good[:, None, None], many, 0.0) / (sizes[:, :, None] * sizes[:, None, :])
+    values = np.linalg.eigvalsh(scaled)
+    good &= values[:, 0] >= -ROUNDING * np.maximum(values[:, -1], 1.0)
+    if not good.all():
+        raise WildlabError(
+            "not finite, not symmetric, or with a negative variance in some direction",
+            "give a covariance",
+            field=field if P.ndim == 2 else f"{field}[{int(np.argmin(good))}]",
         )
-    variances = np.diag(P)
-    if (variances < 0).any():
-        row = int(np.argmax(variances < 0))
-        return f"row {row} has the variance {variances[row]:g}"
-    row = int(np.argmax(np.abs(np.linalg.eigh(_per_sd(P))[1][:, 0])))
-    return f"the variance is negative in a direction between the states, most of all along row {row}"
 
 
 #: Independent values that a mean is worth at least: with fewer, intervals are wider and hold no more.

@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import block_diag
 
-from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera, normalise, normalise_jacobian
 from wildlab.geometry.camera_poses import CameraPoses, Mount
 from wildlab.geometry.frames import (
@@ -265,17 +264,9 @@ def target_velocity(
     [[18.  1.]]
     """
     pixels, planes = matching(poses, uv, plane_down)
-    measured = np.asarray(flow, float)
-    if measured.shape != pixels.shape:
-        raise WildlabError(
-            f"flow of the shape {measured.shape} for pixels of the shape {pixels.shape}",
-            "give one flow for each pixel",
-            field="flow",
-        )
-    rates = _turned(poses.R_nb, camera_rates(poses, motion))
-    return _over_plane(
-        poses.camera, pixels, measured, poses.p_nc, poses.R_nc, lens_velocity(poses, motion), rates, planes
-    )
+    v, w = lens_velocity(poses, motion), _turned(poses.R_nb, camera_rates(poses, motion))
+    moved = np.asarray(flow, float)
+    return _over_plane(poses.camera, pixels, moved, poses.p_nc, poses.R_nc, v, w, planes)
 
 
 def _over_plane(
@@ -301,21 +292,6 @@ def _turned(R: Array, vectors: Array) -> Array:
     return np.asarray(np.einsum("...ij,...j->...i", R, vectors))
 
 
-def _positive_interval(interval: float) -> float:
-    """The time between two images, s.
-
-    Raises
-    ------
-    WildlabError
-        Where it is not above zero.
-    """
-    if not (np.isfinite(interval) and interval > 0):
-        raise WildlabError(
-            f"{interval} s between two images", "give two images in order, with their times", field="interval"
-        )
-    return float(interval)
-
-
 def flow_between(uv_first: ArrayLike, uv_second: ArrayLike, interval: float) -> tuple[Array, Array]:
     """Pixels half way between two images, (N, 2), and their flow, (N, 2) px/s.
 
@@ -330,20 +306,14 @@ def flow_between(uv_first: ArrayLike, uv_second: ArrayLike, interval: float) -> 
     -------
     (middle, flow)
 
-    Raises
-    ------
-    WildlabError
-        Where the interval is not above zero.
-
     Examples
     --------
     >>> middle, flow = flow_between([[10.0, 20.0]], [[12.0, 20.0]], 0.1)
     >>> print(middle, flow)
     [[11. 20.]] [[20.  0.]]
     """
-    seconds = _positive_interval(interval)
     here, there = np.asarray(uv_first, float), np.asarray(uv_second, float)
-    return (here + there) / 2, (there - here) / seconds
+    return (here + there) / 2, (there - here) / interval
 
 
 def motion_between(
@@ -366,18 +336,7 @@ def motion_between(
         Means of positions and gimbal angles, half of the rotation between the attitudes; differences over
         the interval. The covariance is the first's.
 
-    Raises
-    ------
-    WildlabError
-        Where the interval is not above zero, or mounts or numbers of rows differ.
     """
-    seconds = _positive_interval(interval)
-    if first.mount != second.mount or first.rows != second.rows:
-        raise WildlabError(
-            f"poses of the rows {first.rows} and {second.rows}, or of two mounts",
-            "give poses of one camera, a pair in each row",
-            field="second",
-        )
     turn = matrix_to_rotation_vector(np.swapaxes(first.R_nb, -1, -2) @ second.R_nb)
     half = first.R_nb @ rotation_vector_to_matrix(turn / 2)
     rates = np.zeros((*first.rows, 2))
@@ -386,10 +345,10 @@ def motion_between(
         if before is not None and after is not None:
             change = wrap(after - before)
             angles[column] = np.asarray(before + change / 2)
-            rates[..., column] = change / seconds
-    moved = (second.p_nb - first.p_nb) / seconds if velocity is None else np.asarray(velocity, float)
+            rates[..., column] = change / interval
+    moved = (second.p_nb - first.p_nb) / interval if velocity is None else np.asarray(velocity, float)
     poses = replace(first, p_nb=(first.p_nb + second.p_nb) / 2, R_nb=half, pan=angles[0], tilt=angles[1])
-    return poses, CameraMotion(moved, turn / seconds, rates)
+    return poses, CameraMotion(moved, turn / interval, rates)
 
 
 class FlowErrors(NamedTuple):
@@ -507,19 +466,8 @@ def mean_velocity(
     -------
     Velocity
         NaN where no ray meets the plane.
-
-    Raises
-    ------
-    WildlabError
-        Where there is more than one pose, or no feature.
     """
     pixels = np.asarray(uv, float)
-    if poses.rows or pixels.ndim != 2 or not len(pixels):
-        raise WildlabError(
-            f"poses of the rows {poses.rows} for pixels of the shape {pixels.shape}",
-            "give one pose and at least one feature, (N, 2)",
-            field="poses",
-        )
     velocities = target_velocity(poses, motion, pixels, flow, plane_down)
     there = np.isfinite(velocities).all(axis=1)
     if not there.any():

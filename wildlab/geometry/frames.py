@@ -175,6 +175,42 @@ def matrix_to_rotation_vector(R: ArrayLike) -> Array:
     return np.asarray(Rotation.from_matrix(np.asarray(R, float)).as_rotvec())
 
 
+def between_attitudes(q_nb: ArrayLike, before: Indices, after: Indices, share: ArrayLike) -> Array:
+    """Rotations on the way from some attitudes to others, turning at an even rate the shorter way (slerp).
+
+    Parameters
+    ----------
+    q_nb
+        (M, 4) quaternions w, x, y, z, of any length but zero.
+    before, after
+        (N,) their rows to start from and to end at.
+    share
+        (N,) how far on the way, 0 at the start and 1 at the end.
+
+    Returns
+    -------
+    (N, 3, 3), takes a vector from b to n; NaN where the share or one of both quaternions is NaN or zero.
+
+    Examples
+    --------
+    Half-way from north to east is north-east:
+
+    >>> q = np.array([[1.0, 0.0, 0.0, 0.0], [np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)]])
+    >>> R = between_attitudes(q, np.array([0]), np.array([1]), np.array([0.5]))
+    >>> print(np.round(R[0] @ [1.0, 0.0, 0.0], 3))
+    [0.707 0.707 0.   ]
+    """
+    q, s = np.asarray(q_nb, float), np.asarray(share, float)
+    size = np.linalg.norm(q, axis=1)
+    known = np.isfinite(size) & (size > 0)
+    known = known[before] & known[after] & np.isfinite(s)
+    start, end = (Rotation.from_quat(q[rows[known]], scalar_first=True) for rows in (before, after))
+    turn = Rotation.from_rotvec(s[known, None] * (start.inv() * end).as_rotvec())
+    R = np.full((len(s), 3, 3), np.nan)
+    R[known] = (start * turn).as_matrix()
+    return R
+
+
 def skew(vector: ArrayLike) -> Array:
     """``S(a)`` with ``S(a) b = a x b``, H (5.1).
 

@@ -18,10 +18,18 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera, normalise, project
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
-from wildlab.geometry.rays import RAY_STATUS
 
-#: Rows worked on at a time: three columns of them fit into the cache.
-BLOCK = 32_768
+#: What becomes of a ray.
+HIT, MISSED, NO_DATA, BELOW, NOT_KNOWN = 0, 1, 2, 3, 4
+
+#: The same in words.
+RAY_STATUS = {
+    HIT: "met the ground",
+    MISSED: "left the map without meeting the ground",
+    NO_DATA: "came to where the map has no height",
+    BELOW: "started below the ground",
+    NOT_KNOWN: "has no direction or no start",
+}
 
 
 def georeference_pixels(poses: CameraPoses, uv: ArrayLike, plane_down: ArrayLike) -> Array:
@@ -110,8 +118,6 @@ def pixel_rays(camera: Camera, uv: ArrayLike, R_nc: ArrayLike) -> Array:
     """
     xy = normalise(camera, uv)
     R = np.asarray(R_nc, float)
-    if R.ndim == 2:
-        return np.asarray(xy @ R[:, :2].T + R[:, 2])
     return np.asarray(R[..., :, 0] * xy[..., :1] + R[..., :, 1] * xy[..., 1:] + R[..., :, 2])
 
 
@@ -139,41 +145,7 @@ def pixel_to_plane(
     (N, 3) metres in n. Rows are NaN where the ray does not meet the plane in front of the camera: at or above
     the horizon, or a camera below the plane.
     """
-    uv, p, R = (np.asarray(a, float) for a in (uv, p_nc, R_nc))
-    plane = np.asarray(plane_down, float)
-    if uv.ndim != 2 or any(a.ndim > base and len(a) != len(uv) for a, base in ((p, 1), (R, 2), (plane, 0))):
-        return intersect_plane(pixel_rays(camera, uv, R), p, plane)
-    ground = np.empty((len(uv), 3))
-    for start in range(0, len(uv), BLOCK):
-        rows = slice(start, start + BLOCK)
-        one = [a[rows] if a.ndim > base else a for a, base in ((p, 1), (R, 2), (plane, 0))]
-        _fill_ground(ground[rows], normalise(camera, uv[rows]), *one)
-    return ground
-
-
-def _fill_ground(ground: Array, xy: Array, p: Array, R: Array, plane: Array) -> None:
-    """``intersect_plane(pixel_rays(...))`` written into ``ground`` (N, 3), one coordinate after the other.
-
-    Columns that lie side by side in memory, a block small enough for the cache: five times as fast as rows.
-    """
-    x, y = np.ascontiguousarray(xy.T)
-
-    def along(axis: int) -> Array:
-        d = R[..., axis, 0] * x
-        d += R[..., axis, 1] * y
-        d += R[..., axis, 2]
-        return np.asarray(d)
-
-    down, drop = along(2), plane - p[..., 2]
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        depth = drop / down
-        depth[~((down > 0) & (drop > 0))] = np.nan
-        for axis in (0, 1):
-            d = along(axis)
-            d *= depth
-            d += p[..., axis]
-            ground[:, axis] = d
-        ground[:, 2] = plane + 0.0 * depth  # exactly the plane, and NaN where there is no point
+    return intersect_plane(pixel_rays(camera, uv, R_nc), p_nc, plane_down)
 
 
 def intersect_plane(rays: ArrayLike, p_nc: ArrayLike, plane_down: ArrayLike) -> Array:
@@ -336,7 +308,7 @@ class Terrain:
         (N, 2) metres upwards for a metre north, and for a metre east; NaN as `heights_at`.
         """
         i, j, u, v = self._cells(north_east)
-        h = self.height.astype(float, copy=False) if self.height.size < 1e6 else self.height
+        h = self.height
         a, b, c, d = (np.asarray(h[p, q], float) for p, q in ((i, j), (i, j + 1), (i + 1, j), (i + 1, j + 1)))
         with np.errstate(invalid="ignore"):
             north = (1 - u) * (c - a) + u * (d - b)
@@ -391,11 +363,6 @@ def intersect_terrain(terrain: Terrain, rays: ArrayLike, p_nc: ArrayLike, furthe
     -------
     Met
 
-    Raises
-    ------
-    WildlabError
-        Where there are neither as many starts as rays, nor one.
-
     Examples
     --------
     >>> import numpy as np
@@ -404,22 +371,18 @@ def intersect_terrain(terrain: Terrain, rays: ArrayLike, p_nc: ArrayLike, furthe
     [[50.  0. -5.]]
     """
     directions = np.atleast_2d(np.asarray(rays, float))
-    starts = np.atleast_2d(np.asarray(p_nc, float))
-    if directions.shape[-1] != 3 or starts.shape[-1] != 3 or len(starts) not in (1, len(directions)):
-        raise WildlabError(
-            f"starts of the shape {starts.shape} for rays of the shape {directions.shape}",
-            "give one start for each ray, or one for all, three columns each",
-            field="p_nc",
-        )
+    starts = np.broadcast_to(np.asarray(p_nc, float), directions.shape)
     # Compiled functions are imported where they are called: a compiler takes its time to be imported.
-    from wildlab.geometry.compilation import announced
     from wildlab.geometry.kernels import walk_all
 
-    grid = _to_grid(terrain, starts, whole=True)
-    along = _to_grid(terrain, directions, whole=False)
+    # Columns, rows, metres upwards.
+    scale = [terrain.step, terrain.step, -1.0]
+    grid, along = (
+        np.ascontiguousarray(vectors[:, [1, 0, 2]] / scale)
+        for vectors in (starts - [terrain.north, terrain.east, 0.0], directions)
+    )
     blocks, shapes = terrain._blocks
-    with announced("the walk over terrain"):
-        at, became = walk_all(terrain.height, blocks, shapes, grid, along, float(furthest), terrain._top)
+    at, became = walk_all(terrain.height, blocks, shapes, grid, along, float(furthest), terrain._top)
     points = np.asarray(starts + at[:, None] * directions)
     return Met(points, became)
 
@@ -449,28 +412,13 @@ def pixels_to_terrain(poses: CameraPoses, uv: ArrayLike, terrain: Terrain) -> Me
     return intersect_terrain(terrain, pixel_rays(poses.camera, pixels, poses.R_nc), poses.p_nc)
 
 
-def _to_grid(terrain: Terrain, vectors: Array, *, whole: bool) -> Array:
-    """(N, 3) of n as columns, rows, metres upwards; ``whole`` for points, not for directions."""
-    origin = (terrain.east, terrain.north) if whole else (0.0, 0.0)
-    return np.stack(
-        [
-            (vectors[:, 1] - origin[0]) / terrain.step,
-            (vectors[:, 0] - origin[1]) / terrain.step,
-            -vectors[:, 2],
-        ],
-        axis=-1,
-    )
-
-
 def _pyramid(height: NDArray[np.float32], top: float) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
     """Highest nodes of blocks of 4, 8, 16, ... cells a side, one after the other, and each level's shape."""
-    from wildlab.geometry.compilation import announced
-    from wildlab.geometry.kernels import FIRST, highest_of_blocks, highest_of_four
+    from wildlab.geometry.kernels import FIRST, highest, highest_of_blocks
 
-    with announced("the walk over terrain"):
-        levels = [highest_of_blocks(height, 1 << FIRST, top)]
-        while max(levels[-1].shape) > 1:
-            levels.append(highest_of_four(levels[-1]))
+    levels = [highest_of_blocks(height, 1 << FIRST, top)]
+    while max(levels[-1].shape) > 1:
+        levels.append(highest(levels[-1]))
     shapes = np.array([one.shape for one in levels], np.int64)
     begins = np.concatenate([[0], np.cumsum(shapes.prod(axis=1))[:-1]])
     return np.concatenate([one.ravel() for one in levels]), np.column_stack([shapes, begins])

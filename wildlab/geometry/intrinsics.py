@@ -182,8 +182,7 @@ def calibrate_camera(
     Raises
     ------
     WildlabError
-        Where there are fewer than four views, a view has fewer than six points, the shapes do not fit, or no
-        camera fits the views.
+        Where there are fewer than four views, a view has fewer than six points, or no camera fits the views.
 
     Examples
     --------
@@ -246,11 +245,6 @@ def view_errors(camera: Camera, board: ArrayLike, uv: ArrayLike) -> Array:
 
 
 def _check(board: Array, uv: Array) -> None:
-    if board.ndim != 2 or board.shape[1] != 3 or uv.ndim != 3 or uv.shape[1:] != (len(board), 2):
-        raise WildlabError(
-            f"a board of shape {board.shape} and pixels of shape {uv.shape} do not fit",
-            "give the board as (M, 3) and the pixels as (V, M, 2)",
-        )
     if len(uv) < FEWEST:
         raise WildlabError(
             f"{len(uv)} view{'' if len(uv) == 1 else 's'} of the board, and at least {FEWEST} are needed",

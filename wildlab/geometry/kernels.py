@@ -1,14 +1,10 @@
-"""Compiled: lenses without their distortion, attitudes between two others, rays and lines over terrain.
+"""Compiled: rays over terrain.
 
 Over bilinear patches it is one walk from cell to cell that steps over whole blocks.
 
 A patch is the bilinear surface over four neighbouring nodes. Along a ray its height is a quadratic in the
 ray's parameter, so where the ray meets it is known exactly; nothing is marched. A ray that stays above the
 highest node of a block passes the whole block in one step.
-
-Whether a line is clear asks for no place: it is followed from its lower end, for that is where ground hides
-it; above the highest node nothing does. What hid the line before is tried first: neighbours are hidden by the
-same ridge.
 
 Coordinates are those of the grid: ``x`` in columns (east), ``y`` in rows (north), ``z`` metres upwards.
 `wildlab.geometry.georeference` gives them their place in n.
@@ -19,127 +15,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
-from wildlab.geometry.compilation import announced, compiled
-from wildlab.geometry.rays import BELOW, HIT, MISSED, NO_DATA, NOT_KNOWN
-
-
-@compiled
-def undistort_rows(
-    points: Array, k1: float, k2: float, p1: float, p2: float, k3: float, tolerance: float
-) -> None:
-    """`wildlab.geometry.camera.undistort` of ``points`` (N, 2), in place."""
-    for i in range(len(points)):
-        u, v = points[i]
-        x, y = u, v
-        for step in range(51):
-            r2 = x * x + y * y
-            radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
-            slope = 2 * (k1 + r2 * (2 * k2 + r2 * 3 * k3))
-            a = radial + slope * x * x + 2 * p1 * y + 6 * p2 * x
-            b = slope * x * y + 2 * p1 * x + 2 * p2 * y
-            d = radial + slope * y * y + 6 * p1 * y + 2 * p2 * x
-            determinant = a * d - b * b
-            miss_x = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x) - u
-            miss_y = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y - v
-            miss = max(abs(miss_x), abs(miss_y))
-            if not miss > tolerance or step == 50:
-                break
-            step_x = (d * miss_x - b * miss_y) / determinant
-            step_y = (a * miss_y - b * miss_x) / determinant
-            # A long step would leap over the fold of the polynomial.
-            length = np.hypot(step_x, step_y)
-            shortened = min(1.0, 0.3 / length) if length > 0 else 1.0
-            x, y = x - step_x * shortened, y - step_y * shortened
-        one_to_one = determinant > 0 and a > 0
-        solved = miss <= max(tolerance, 1e-12)
-        points[i, 0] = x if one_to_one and solved else np.nan
-        points[i, 1] = y if one_to_one and solved else np.nan
-
+from wildlab.geometry.compilation import compiled
+from wildlab.geometry.georeference import BELOW, HIT, MISSED, NO_DATA, NOT_KNOWN
 
 Array = Any
-Rows = NDArray[np.intp]
-
-
-def between_attitudes(q_nb: ArrayLike, before: Rows, after: Rows, share: ArrayLike) -> Array:
-    """Rotations on the way from some attitudes to others, turning at an even rate the shorter way (slerp).
-
-    Parameters
-    ----------
-    q_nb
-        (M, 4) quaternions w, x, y, z, of any length but zero.
-    before, after
-        (N,) their rows to start from and to end at.
-    share
-        (N,) how far on the way, 0 at the start and 1 at the end.
-
-    Returns
-    -------
-    (N, 3, 3), takes a vector from b to n; NaN where the share or one of both quaternions is NaN or zero.
-
-    Examples
-    --------
-    Half-way from north to east is north-east:
-
-    >>> q = np.array([[1.0, 0.0, 0.0, 0.0], [np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)]])
-    >>> R = between_attitudes(q, np.array([0]), np.array([1]), np.array([0.5]))
-    >>> print(np.round(R[0] @ [1.0, 0.0, 0.0], 3))
-    [0.707 0.707 0.   ]
-    """
-    q, s = np.ascontiguousarray(q_nb, float), np.ascontiguousarray(share, float)
-    R = np.empty((len(s), 3, 3))
-    with announced("attitudes between two others"):
-        _fill(q, np.ascontiguousarray(before), np.ascontiguousarray(after), s, R)
-    return R
-
-
-@compiled
-def _fill(q: Array, before: Rows, after: Rows, share: Array, R: Array) -> None:
-    for k in range(len(share)):
-        i, j, s = before[k], after[k], share[k]
-        a, b, c, d = q[i, 0], q[i, 1], q[i, 2], q[i, 3]
-        e, f, g, h = q[j, 0], q[j, 1], q[j, 2], q[j, 3]
-        size, other = np.sqrt(a * a + b * b + c * c + d * d), np.sqrt(e * e + f * f + g * g + h * h)
-        if not (np.isfinite(s) and np.isfinite(size) and np.isfinite(other) and size > 0 and other > 0):
-            R[k] = np.nan
-            continue
-        a, b, c, d = a / size, b / size, c / size, d / size
-        e, f, g, h = e / other, f / other, g / other, h / other
-        # The turn from one to the other: the first backwards, then the second.
-        w = a * e + b * f + c * g + d * h
-        x = a * f - b * e - c * h + d * g
-        y = a * g + b * h - c * e - d * f
-        z = a * h - b * g + c * f - d * e
-        if w < 0:  # the same turn the shorter way
-            w, x, y, z = -w, -x, -y, -z
-        length = np.sqrt(x * x + y * y + z * z)
-        half = np.arctan2(length, w)
-        # sin(s half) / sin(half), which is s where both vanish.
-        scale = np.sin(s * half) / length if length > 1e-12 else s
-        w, x, y, z = np.cos(s * half), scale * x, scale * y, scale * z
-        a, b, c, d = (
-            a * w - b * x - c * y - d * z,
-            a * x + b * w + c * z - d * y,
-            a * y - b * z + c * w + d * x,
-            a * z + b * y - c * x + d * w,
-        )
-        size = a * a + b * b + c * c + d * d
-        R[k, 0, 0], R[k, 0, 1], R[k, 0, 2] = (
-            1 - 2 * (c * c + d * d) / size,
-            2 * (b * c - a * d) / size,
-            2 * (b * d + a * c) / size,
-        )
-        R[k, 1, 0], R[k, 1, 1], R[k, 1, 2] = (
-            2 * (b * c + a * d) / size,
-            1 - 2 * (b * b + d * d) / size,
-            2 * (c * d - a * b) / size,
-        )
-        R[k, 2, 0], R[k, 2, 1], R[k, 2, 2] = (
-            2 * (b * d - a * c) / size,
-            2 * (c * d + a * b) / size,
-            1 - 2 * (b * b + c * c) / size,
-        )
 
 
 #: Any array: the types are the compiler's business.
@@ -150,34 +30,17 @@ FIRST = 2
 TINY = 1e-150
 
 
-@compiled
 def highest_of_blocks(height: Array, side: int, lone: float) -> Array:
     """Highest node of each block of ``side`` cells, both edges included; missing nodes count as ``lone``."""
-    cells = (height.shape[0] - 1, height.shape[1] - 1)
-    out = np.empty((-(-cells[0] // side), -(-cells[1] // side)), np.float32)
-    for bi in range(out.shape[0]):
-        for bj in range(out.shape[1]):
-            top = -np.inf
-            for i in range(bi * side, min((bi + 1) * side, cells[0]) + 1):
-                for j in range(bj * side, min((bj + 1) * side, cells[1]) + 1):
-                    h = height[i, j]
-                    top = max(top, h if h == h else lone)
-            out[bi, bj] = top
-    return out
+    nodes = np.where(np.isnan(height), np.float32(lone), height)
+    cells = np.maximum(nodes[:-1], nodes[1:])
+    return highest(np.maximum(cells[:, :-1], cells[:, 1:]), side)
 
 
-@compiled
-def highest_of_four(below: Array) -> Array:
-    """Highest of each two by two blocks."""
-    out = np.empty((-(-below.shape[0] // 2), -(-below.shape[1] // 2)), np.float32)
-    for i in range(out.shape[0]):
-        for j in range(out.shape[1]):
-            top = -np.inf
-            for a in range(2 * i, min(2 * i + 2, below.shape[0])):
-                for b in range(2 * j, min(2 * j + 2, below.shape[1])):
-                    top = max(top, below[a, b])
-            out[i, j] = top
-    return out
+def highest(below: Array, side: int = 2) -> Array:
+    """Highest of each block of ``side`` by ``side``; the last ones may be smaller."""
+    rows, columns = (np.arange(0, count, side) for count in below.shape)
+    return np.maximum.reduceat(np.maximum.reduceat(below, rows, axis=0), columns, axis=1)
 
 
 @compiled
@@ -332,149 +195,9 @@ def walk(
 def walk_all(
     height: Array, blocks: Array, shapes: Array, starts: Array, rays: Array, furthest: float, top: float
 ) -> tuple[Array, Array]:
-    """`walk` for every row of ``starts`` and ``rays``; one start may stand for all."""
+    """`walk` for every row of ``starts`` and ``rays``."""
     count = rays.shape[0]
     at, became = np.empty(count), np.empty(count, np.int8)
-    one = starts.shape[0] == 1
     for n in range(count):
-        at[n], became[n] = walk(height, blocks, shapes, starts[0 if one else n], rays[n], furthest, top)
+        at[n], became[n] = walk(height, blocks, shapes, starts[n], rays[n], furthest, top)
     return at, became
-
-
-@compiled
-def touches(height: Array, i: int, j: int, u: float, v: float, z: float, ray: Array, end: float) -> bool:
-    """Whether a line that enters patch (i, j) at (u, v, z) comes down to it within ``end`` of its parameter.
-
-    True too where the patch lacks a node: NaN compares as not above.
-    """
-    a = np.float64(height[i, j])
-    b, c = height[i, j + 1] - a, height[i + 1, j] - a
-    d = height[i + 1, j + 1] - a - b - c
-    above = z - (a + b * u + c * v + d * u * v)
-    if not above > 0:
-        return True
-    slope = ray[2] - (b * ray[0] + c * ray[1] + d * (u * ray[1] + v * ray[0]))
-    bend = -d * ray[0] * ray[1]
-    if not above + end * (slope + end * bend) > 0:
-        return True
-    # Between both ends it dips where the height above the ground is bent upwards and falls at first.
-    dips: bool = bend > 0 and slope < 0 and -slope < 2 * bend * end and slope * slope >= 4 * bend * above
-    return dips
-
-
-@compiled
-def hidden_at(
-    height: Array,
-    blocks: Array,
-    shapes: Array,
-    start: Array,
-    ray: Array,
-    begin: float,
-    end: float,
-    top: float,
-) -> float:
-    """Parameter near which a line is hidden, followed from ``begin`` to ``end``; NaN where it is clear.
-
-    ``ray[2]`` is not below zero: the line rises.
-    """
-    rows, columns = height.shape
-    x, y, z = start[0], start[1], start[2]
-    dx = 0.0 if abs(ray[0]) < TINY else ray[0]
-    dy = 0.0 if abs(ray[1]) < TINY else ray[1]
-    dz = ray[2]
-    t = begin
-    for position, along, last in ((x, dx, columns - 1.0), (y, dy, rows - 1.0)):
-        if along == 0:
-            if position < 0 or position > last:
-                return np.nan
-            continue
-        near, far = -position / along, (last - position) / along
-        t, end = max(t, min(near, far)), min(end, max(near, far))
-    if dz > 0:
-        end = min(end, (top - z) / dz)
-    elif z > top:
-        return np.nan
-    if not t <= end:
-        return np.nan
-    per_x, per_y = 1 / dx if dx else np.inf, 1 / dy if dy else np.inf
-    levels = shapes.shape[0]
-    level = 0
-    j = min(max(int(x + t * dx), 0), columns - 2)
-    i = min(max(int(y + t * dy), 0), rows - 2)
-    # Every step crosses a border or goes down a level, and every border takes it up by one level at most.
-    for _ in range(4 * (rows + columns) + 100):
-        size = 0 if level == 0 else FIRST + level - 1
-        bi, bj = i >> size, j >> size
-        if level > 0 and z + t * dz <= blocks[shapes[level - 1, 2] + bi * shapes[level - 1, 1] + bj]:
-            level -= 1
-            continue
-        left, low = bj << size, bi << size
-        right, high = min(left + (1 << size), columns - 1), min(low + (1 << size), rows - 1)
-        tx = np.inf if dx == 0 else ((right if dx > 0 else left) - x) * per_x
-        ty = np.inf if dy == 0 else ((high if dy > 0 else low) - y) * per_y
-        out = max(min(tx, ty, end), t)
-        if level == 0 and touches(height, i, j, x + t * dx - j, y + t * dy - i, z + t * dz, ray, out - t):
-            return t
-        if out >= end:
-            return np.nan
-        t = out
-        was_i, was_j = i, j
-        # The border that was crossed says in which cell the walk goes on; rounding has no say in it.
-        if tx <= ty:
-            j = right if dx > 0 else left - 1
-            if tx < ty:
-                i = onward(y + t * dy, dy, i, low, high - 1)
-        if ty <= tx:
-            i = high if dy > 0 else low - 1
-            if ty < tx:
-                j = onward(x + t * dx, dx, j, left, right - 1)
-        if not (0 <= i < rows - 1 and 0 <= j < columns - 1):
-            return np.nan
-        # The block about this one was looked at and is too high; the next one may not be.
-        wider = FIRST + level
-        if level < levels and (was_i >> wider != i >> wider or was_j >> wider != j >> wider):
-            level += 1
-    return t
-
-
-@compiled
-def clear_all(
-    height: Array, blocks: Array, shapes: Array, lenses: Array, points: Array, short: float, top: float
-) -> Array:
-    """Whether the line from a lens to each point is clear, but for ``short`` of its length before the point.
-
-    One lens may stand for all.
-    """
-    rows, columns = height.shape
-    clear = np.zeros(points.shape[0], np.bool_)
-    start, ray = np.empty(3), np.empty(3)
-    hint_x, hint_y = np.nan, np.nan
-    for n in range(points.shape[0]):
-        lens, point = lenses[0 if lenses.shape[0] == 1 else n], points[n]
-        rises = lens[2] >= point[2]
-        known = True
-        for k in range(3):
-            start[k] = point[k] if rises else lens[k]
-            ray[k] = lens[k] - point[k] if rises else point[k] - lens[k]
-            known = known and np.isfinite(start[k] + ray[k])
-        if not known:
-            continue
-        begin, end = (short, 1.0) if rises else (0.0, 1.0 - short)
-        # What hid the line before may hide this one: at the place on it that is nearest to that.
-        flat = ray[0] * ray[0] + ray[1] * ray[1]
-        s = ((hint_x - start[0]) * ray[0] + (hint_y - start[1]) * ray[1]) / flat
-        if begin <= s <= end:
-            x, y = start[0] + s * ray[0], start[1] + s * ray[1]
-            if 0 <= x <= columns - 1 and 0 <= y <= rows - 1:
-                j, i = min(int(x), columns - 2), min(int(y), rows - 2)
-                u, v = x - j, y - i
-                low = (1 - u) * height[i, j] + u * height[i, j + 1]
-                high = (1 - u) * height[i + 1, j] + u * height[i + 1, j + 1]
-                if start[2] + s * ray[2] < (1 - v) * low + v * high:
-                    continue
-        t = hidden_at(height, blocks, shapes, start, ray, begin, end, top)
-        if t == t:
-            hint_x, hint_y = start[0] + t * ray[0], start[1] + t * ray[1]
-        else:
-            clear[n] = True
-    return clear

@@ -21,13 +21,11 @@ elsewhere than on the plane by more than a fraction of the ellipse, samples deci
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.errors import WildlabError
 from wildlab.geometry.camera import normalise, normalise_jacobian
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.covariances import chi2_quantile
@@ -79,7 +77,7 @@ class PoseErrors(NamedTuple):
 
 
 class GroundCovariance(NamedTuple):
-    """Result of :func:`ground_covariance` and :func:`terrain_covariance`.
+    """Result of :func:`ground_covariance`.
 
     Attributes
     ----------
@@ -312,9 +310,10 @@ def ray_heading_sd(poses: CameraPoses, errors: PoseErrors) -> Array:
 def ground_covariance(
     poses: CameraPoses,
     uv: ArrayLike,
-    plane_down: ArrayLike,
+    ground: Terrain | ArrayLike,
     errors: PoseErrors,
     rng: np.random.Generator,
+    met: Met | None = None,
 ) -> GroundCovariance:
     """Covariance of each ground point (north, east), by linearisation or, where that fails, by sampling.
 
@@ -327,12 +326,14 @@ def ground_covariance(
         The camera, with a pose for each pixel or one for all.
     uv
         (N, 2) or (2,) pixels, one row per detection.
-    plane_down
-        Down coordinate of the plane in n, metres, scalar or (N,).
+    ground
+        Terrain in the same n, or the down coordinate of a plane in n, metres, scalar or (N,).
     errors
         Covariances of the sources, see :class:`PoseErrors`.
     rng
         Drawn from only where a ray is sampled.
+    met
+        Where the rays meet the terrain, if that is known already.
 
     Returns
     -------
@@ -341,77 +342,41 @@ def ground_covariance(
     Raises
     ------
     WildlabError
-        Where there is another number of poses, of planes or of errors than of pixels.
+        Where there is another number of poses than of pixels.
     """
-    pixels = np.atleast_2d(uv).astype(float)
-    planes = np.broadcast_to(np.asarray(plane_down, float), len(pixels))
-    _check_errors(errors, len(pixels))
-    points = georeference_pixels(poses, pixels, planes)
-    level = 0.0 * points[:, :2]
-    covariance = _linear(terrain_jacobians(poses, pixels, points, level), errors)
-    curved = _curved(poses, pixels, points, level, covariance, errors)
-
-    def sample(i: int, one: PoseErrors) -> Array:
-        return sample_ground(poses.take(i), pixels[i], float(planes[i]), one, rng, SAMPLES)
-
-    found = _with_samples(covariance, curved, errors, sample, points, poses)
-    # On a plane there is no ridge that would part samples: those far away are rays along it.
-    return found._replace(method=np.where(found.method == "split", "sampled", found.method))
-
-
-def terrain_covariance(
-    poses: CameraPoses,
-    uv: ArrayLike,
-    terrain: Terrain,
-    errors: PoseErrors,
-    rng: np.random.Generator,
-    met: Met | None = None,
-) -> GroundCovariance:
-    """Covariance of each point (north, east) on terrain, by linearisation or, where that fails, by sampling.
-
-    A sampled covariance has the shape of the samples' second moment about the computed point and the size
-    that puts 90 % of them inside its 90 % ellipse, as in `ground_covariance`.
-
-    Parameters
-    ----------
-    poses
-        The camera, with a pose for each pixel or one for all.
-    uv
-        (N, 2) pixels.
-    terrain
-        In the same n.
-    errors
-        Covariances of the sources; ``plane`` is the variance of the terrain's height.
-    rng
-        Drawn from only where a ray is sampled.
-    met
-        Where the rays meet the terrain, if that is known already.
-
-    Returns
-    -------
-    GroundCovariance
-
-    Raises
-    ------
-    WildlabError
-        Where there is another number of poses, or of errors, than of pixels.
-    """
-    pixels, _ = matching(poses, np.atleast_2d(np.asarray(uv, float)))
-    _check_errors(errors, len(pixels))
-    points = (pixels_to_terrain(poses, pixels, terrain) if met is None else met).points
-    slopes = terrain.slopes_at(points[:, :2])
+    pixels = np.atleast_2d(np.asarray(uv, float))
+    n = len(pixels)
+    terrain = ground if isinstance(ground, Terrain) else None
+    planes = np.zeros(n) if terrain else np.broadcast_to(np.asarray(ground, float), n)
+    if terrain:
+        points = (pixels_to_terrain(poses, pixels, terrain) if met is None else met).points
+        slopes = terrain.slopes_at(points[:, :2])
+    else:
+        points = georeference_pixels(poses, pixels, planes)
+        slopes = 0.0 * points[:, :2]
     covariance = _linear(terrain_jacobians(poses, pixels, points, slopes), errors)
     linear = np.isfinite(covariance).all(axis=(1, 2))
-    # A ray may end where the slope has no height beside it: a point without a plane is sampled, too.
-    doubtful = np.isfinite(points).all(axis=1) & ~linear
-    doubtful |= _curved(poses, pixels, points, slopes, covariance, errors)
-    rest = linear & ~doubtful
-    doubtful[rest] = _bent(poses.take(rest), terrain, points[rest], slopes[rest], covariance[rest])
-
-    def sample(i: int, one: PoseErrors) -> Array:
-        return sample_terrain(poses.take(i), pixels[i], terrain, one, rng, SAMPLES)
-
-    return _with_samples(covariance, doubtful, errors, sample, points, poses)
+    doubtful = linear & _curved(poses, pixels, points, slopes, covariance, errors)
+    if terrain:
+        # A ray may end where the slope has no height beside it: a point without a plane is sampled, too.
+        doubtful |= np.isfinite(points).all(axis=1) & ~linear
+        rest = linear & ~doubtful
+        doubtful[rest] = _bent(poses.take(rest), terrain, points[rest], slopes[rest], covariance[rest])
+    method = np.where(linear, "linear", "none").astype("<U9")
+    for i in np.flatnonzero(doubtful).tolist():
+        one = PoseErrors(
+            pixel=np.broadcast_to(errors.pixel, (n, 2, 2))[i],
+            pose=np.broadcast_to(errors.pose, (n, 6, 6))[i],
+            mount=errors.mount,
+            plane=float(np.broadcast_to(errors.plane, n)[i]),
+        )
+        pose = poses.take(i)
+        samples = sample_ground(pose, pixels[i], terrain or float(planes[i]), one, rng, SAMPLES)
+        covariance[i], method[i] = _of_samples(samples, points[i], pose.p_nc)
+    if not terrain:
+        # On a plane there is no ridge that would part samples: those far away are rays along it.
+        method[method == "split"] = "sampled"
+    return GroundCovariance(covariance, method)
 
 
 def _curved(
@@ -420,35 +385,13 @@ def _curved(
     """Where the linear covariance (N, 2, 2) of a touching plane is known to be wrong."""
     arc = arc_bend(points[:, :2] - poses.p_nc[..., :2], ray_heading_sd(poses, errors), covariance)
     bent = (arc > ARC) | ~(ray_flatness(poses, pixels, errors, slopes) <= FLAT)
-    return np.asarray(np.isfinite(covariance).all(axis=(1, 2)) & bent)
-
-
-def _with_samples(
-    covariance: Array,
-    doubtful: NDArray[np.bool_],
-    errors: PoseErrors,
-    sample: Callable[[int, PoseErrors], Array],
-    points: Array,
-    poses: CameraPoses,
-) -> GroundCovariance:
-    """Covariances (N, 2, 2), those that are doubtful by samples (S, 2) or (S, 3) about the points."""
-    n = len(covariance)
-    method = np.where(np.isfinite(covariance).all(axis=(1, 2)), "linear", "none").astype("<U9")
-    for i in np.flatnonzero(doubtful).tolist():
-        one = PoseErrors(
-            pixel=np.broadcast_to(errors.pixel, (n, 2, 2))[i],
-            pose=np.broadcast_to(errors.pose, (n, 6, 6))[i],
-            mount=errors.mount,
-            plane=float(np.broadcast_to(errors.plane, n)[i]),
-        )
-        covariance[i], method[i] = _of_samples(sample(i, one), points[i], poses.take(i).p_nc)
-    return GroundCovariance(covariance, method)
+    return np.asarray(bent)
 
 
 def sample_ground(
     pose: CameraPoses,
     uv: ArrayLike,
-    plane_down: float,
+    ground: Terrain | float,
     errors: PoseErrors,
     rng: np.random.Generator,
     n: int,
@@ -461,8 +404,8 @@ def sample_ground(
         The camera, with one pose.
     uv
         (2,) pixel.
-    plane_down
-        Down coordinate of the plane in n, metres.
+    ground
+        Terrain in the same n, or the down coordinate of a plane in n, metres; it rises or sinks as a whole.
     errors
         Covariances of the sources, each given once.
     rng
@@ -472,17 +415,21 @@ def sample_ground(
 
     Returns
     -------
-    (n, 2) metres, north and east; misses are NaN.
+    (n, 3) metres in n; misses are NaN.
 
     Raises
     ------
     WildlabError
         Where there is more than one pose.
     """
-    pixel, plane = matching(pose, uv, plane_down)
+    pixel, _ = matching(pose, uv)
     rays, starts = sample_rays(pose, pixel, errors, rng, n)
-    planes = plane + np.sqrt(errors.plane) * rng.standard_normal(n)
-    return intersect_plane(rays, starts, planes)[:, :2]
+    off = np.sqrt(errors.plane) * rng.standard_normal(n)
+    if not isinstance(ground, Terrain):
+        return intersect_plane(rays, starts, ground + off)
+    # Ground that is higher is the same as a camera that is lower, but for the height of the point.
+    shift = np.column_stack([np.zeros((n, 2)), off])
+    return np.asarray(intersect_terrain(ground, rays, starts + shift).points - shift)
 
 
 def sample_rays(
@@ -518,48 +465,6 @@ def sample_rays(
     return rays, np.asarray(pose.p_nb + off[:, :3] + R @ pose.lever_arm)
 
 
-def sample_terrain(
-    pose: CameraPoses,
-    uv: ArrayLike,
-    terrain: Terrain,
-    errors: PoseErrors,
-    rng: np.random.Generator,
-    n: int,
-) -> Array:
-    """Points on terrain of one detection with its errors drawn from their covariances.
-
-    Parameters
-    ----------
-    pose
-        The camera, with one pose.
-    uv
-        (2,) pixel.
-    terrain
-        In the same n; it rises or sinks as a whole.
-    errors
-        Covariances of the sources, each given once.
-    rng
-        Drawn from.
-    n
-        How many draws.
-
-    Returns
-    -------
-    (n, 3) metres in n; misses are NaN.
-
-    Raises
-    ------
-    WildlabError
-        Where there is more than one pose.
-    """
-    pixel, _ = matching(pose, uv)
-    rays, starts = sample_rays(pose, pixel, errors, rng, n)
-    higher = np.sqrt(float(np.asarray(errors.plane))) * rng.standard_normal(n)
-    # Ground that is higher is the same as a camera that is lower, but for the height of the point.
-    shift = np.column_stack([np.zeros((n, 2)), higher])
-    return np.asarray(intersect_terrain(terrain, rays, starts + shift).points - shift)
-
-
 def _rays(poses: CameraPoses, pixels: Array) -> tuple[Array, Array, Array]:
     """Normalised pixels, and rays of depth 1 in c and in n."""
     xy = normalise(poses.camera, pixels)
@@ -571,16 +476,6 @@ def _normals(slopes: ArrayLike) -> Array:
     """(..., 3) normals of slopes, into the ground: ``down + height(north, east)`` grows along them."""
     given = np.asarray(slopes, float)
     return np.concatenate([given, np.ones((*given.shape[:-1], 1))], axis=-1)
-
-
-def _check_errors(errors: PoseErrors, n: int) -> None:
-    for name, axes in (("pixel", 2), ("pose", 2), ("plane", 0)):
-        shape = np.shape(getattr(errors, name))
-        lead = shape[: len(shape) - axes]
-        if lead not in ((), (n,)):
-            raise WildlabError(
-                f"errors of the rows {lead} for {n} pixels", "give one for each, or one for all", field=name
-            )
 
 
 def _bent(
@@ -620,7 +515,7 @@ def _of_samples(samples: Array, centre: Array, p_nc: Array) -> tuple[Array, str]
         hit, np.einsum("ni,ij,nj->n", offsets, np.linalg.inv(shape), offsets, optimize=True), np.inf
     )
     size = np.quantile(squared, 0.9, method="lower") / chi2_quantile(0.9, 2)
-    away = np.linalg.norm(samples[hit] - p_nc[: samples.shape[1]], axis=1)
+    away = np.linalg.norm(samples[hit] - p_nc, axis=1)
     return np.asarray(shape * size), "split" if _two_groups(away) else "sampled"
 
 

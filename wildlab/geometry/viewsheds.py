@@ -13,7 +13,6 @@ metres upwards.
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,9 +22,8 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera, distort, normalise
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.compilation import compiled
-from wildlab.geometry.frames import Array, wrap
-from wildlab.geometry.georeference import Terrain, _to_grid, intersect_terrain, pixel_rays
-from wildlab.geometry.rays import HIT
+from wildlab.geometry.frames import Array
+from wildlab.geometry.georeference import HIT, MISSED, Terrain, intersect_terrain, pixel_rays
 
 #: A line of sight ends this share of its length before the point: the point lies on the ground itself.
 SHORT_OF = 1e-7
@@ -50,11 +48,6 @@ def lines_clear(terrain: Terrain, points: ArrayLike, p_nc: ArrayLike) -> NDArray
     (N,) bool. False too where the line leads through what the map does not know, below its highest height,
     where the camera is below the ground, and for what is NaN.
 
-    Raises
-    ------
-    WildlabError
-        Where there are neither as many cameras as points, nor one.
-
     Examples
     --------
     A wall of 10 m between a camera and a point; a second point is higher.
@@ -67,20 +60,8 @@ def lines_clear(terrain: Terrain, points: ArrayLike, p_nc: ArrayLike) -> NDArray
     [False  True]
     """
     targets, starts = (np.atleast_2d(np.asarray(each, float)) for each in (points, p_nc))
-    if targets.shape[-1] != 3 or starts.shape[-1] != 3 or len(starts) not in (1, len(targets)):
-        raise WildlabError(
-            f"cameras of the shape {starts.shape} for points of the shape {targets.shape}",
-            "give one camera for each point, or one for all, three columns each",
-            field="p_nc",
-        )
-    # Compiled functions are imported where they are called: a compiler takes its time to be imported.
-    from wildlab.geometry.compilation import announced
-    from wildlab.geometry.kernels import clear_all
-
-    blocks, shapes = terrain._blocks
-    lenses, ends = (_to_grid(terrain, each, whole=True) for each in (starts, targets))
-    with announced("lines of sight"):
-        return np.asarray(clear_all(terrain.height, blocks, shapes, lenses, ends, SHORT_OF, terrain._top))
+    met = intersect_terrain(terrain, targets - starts, starts, 1 - SHORT_OF)
+    return np.asarray(met.became == MISSED)
 
 
 def widest_view(camera: Camera) -> float:
@@ -168,11 +149,6 @@ def footprint(
     Footprint
         What hides ground inside the outline is not cut out.
 
-    Raises
-    ------
-    WildlabError
-        Where there is more than one pose, or no ray for a side.
-
     Examples
     --------
     >>> from wildlab.geometry.camera import Camera
@@ -187,10 +163,6 @@ def footprint(
      [-10. -10.]]
     """
     p, R = np.asarray(poses.p_nc, float), np.asarray(poses.R_nc, float)
-    if p.size != 3 or R.size != 9:
-        raise WildlabError(f"positions of the shape {p.shape}", "give one pose", field="poses")
-    if per_side < 1:
-        raise WildlabError(f"{per_side} rays along a side", "give one at least", field="per_side")
     p, R = p.reshape(3), R.reshape(3, 3)
     met = intersect_terrain(terrain, pixel_rays(poses.camera, _outline(poses, per_side), R), p)
     points = met.points[:, :2].copy()
@@ -214,16 +186,12 @@ def _outline(poses: CameraPoses, per_side: int) -> Array:
 
 def _on_circle(points: Array, near: NDArray[np.bool_], middle: Array, furthest: float) -> Array:
     """Points of a circle in place of those not near, evenly between the near ones beside each run."""
-    count, found = len(points), np.full(points.shape, np.nan)
     bearing = np.arctan2(points[:, 1] - middle[1], points[:, 0] - middle[0])
-    first = int(np.flatnonzero(near)[0])
-    order = (first + np.arange(count + 1)) % count  # begins and ends with a near one
-    stops = np.flatnonzero(near[order])
-    for a, b in pairwise(stops):
-        turn = float(wrap(bearing[order[b]] - bearing[order[a]]))
-        for k in range(a + 1, b):
-            angle = bearing[order[a]] + turn * (k - a) / (b - a)
-            found[order[k]] = middle + furthest * np.array([np.cos(angle), np.sin(angle)])
+    order = (int(np.flatnonzero(near)[0]) + np.arange(len(points) + 1)) % len(points)
+    stops = np.flatnonzero(near[order])  # begins and ends with a near one
+    angle = np.interp(np.arange(len(order)), stops, np.unwrap(bearing[order[stops]]))
+    found = np.empty(points.shape)
+    found[order] = middle + furthest * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     return found[~near]
 
 
@@ -411,7 +379,7 @@ def cast_rays(
     Raises
     ------
     WildlabError
-        Where a node is not on the map, the camera is not one known point, or a length is not above zero.
+        Where a node is not on the map.
 
     Examples
     --------
@@ -424,26 +392,21 @@ def cast_rays(
     [ True  True False]
     """
     rows, columns, lens = _prepared(terrain, nodes, p_nc)
-    for name, length in (("step", step), ("tolerance", tolerance)):
-        if not 0 < length < np.inf:
-            raise WildlabError(f"a {name} of {length} m", "give metres above zero", field=name)
     # Compiled functions are imported where they are called: a compiler takes its time to be imported.
-    from wildlab.geometry.compilation import announced
 
     known = terrain.height[rows, columns]
     top = float(np.nanmax(known, initial=-np.inf)) if shorten else np.inf
-    with announced("lines of sight"):
-        found = cast_all(
-            terrain.height,
-            rows,
-            columns,
-            lens,
-            terrain.step,
-            float(step),
-            float(tolerance),
-            top,
-            terrain._top,
-        )
+    found = cast_all(
+        terrain.height,
+        rows,
+        columns,
+        lens,
+        terrain.step,
+        float(step),
+        float(tolerance),
+        top,
+        terrain._top,
+    )
     return Looked(*found)
 
 
@@ -479,7 +442,7 @@ def compare_angles(
     Raises
     ------
     WildlabError
-        Where a node is not on the map, or the camera is not one known point.
+        Where a node is not on the map.
 
     Examples
     --------
@@ -492,10 +455,8 @@ def compare_angles(
     array([False, False])
     """
     rows, columns, lens = _prepared(terrain, nodes, p_nc)
-    from wildlab.geometry.compilation import announced
 
-    with announced("lines of sight"):
-        found = compare_all(terrain.height, rows, columns, lens, terrain.step, itself, signed, terrain._top)
+    found = compare_all(terrain.height, rows, columns, lens, terrain.step, itself, signed, terrain._top)
     return Looked(*found)
 
 
@@ -510,8 +471,6 @@ def _prepared(
             "give rows and columns of the terrain, counted from 0",
             field="nodes",
         )
-    if p.shape != (3,) or not np.isfinite(p).all():
-        raise WildlabError(f"a camera at {p}", "give one known point: north, east and down", field="p_nc")
     north, east = (p[0] - terrain.north) / terrain.step, (p[1] - terrain.east) / terrain.step
     rows, columns = np.ascontiguousarray(asked[:, 0]), np.ascontiguousarray(asked[:, 1])
     return rows, columns, np.array([east, north, -p[2]])

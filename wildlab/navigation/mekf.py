@@ -24,7 +24,6 @@ from numpy.typing import ArrayLike
 from scipy.linalg import block_diag
 
 from wildlab.errors import WildlabError
-from wildlab.geometry.compilation import announced
 from wildlab.geometry.covariances import check_covariance, gate_threshold
 from wildlab.geometry.frames import Array, Earth, quaternion_to_matrix
 from wildlab.navigation import kernels
@@ -275,13 +274,12 @@ def run_mekf(
     n = len(measured.node)
     innovation, S, nis = np.full((n, 3), np.nan), np.full((n, 3, 3), np.nan), np.full(n, np.nan)
     verdict = np.zeros(n, np.int64)
-    with announced("the navigation filter"):
-        kernels.mekf(
-            line.times, line.f, line.w, line.gap, line.row_of_node, earth.as_array(), ready.noise,
-            ready.state, ready.covariance, ready.axes, ready.extra, measured.node, measured.kind,
-            measured.value, measured.variance, measured.lever, measured.gauss_markov, ready.gate,
-            float(outages.patience), states, covariances, innovation, S, nis, verdict,
-        )  # fmt: skip
+    kernels.mekf(
+        line.times, line.f, line.w, line.gap, line.row_of_node, earth.as_array(), ready.noise,
+        ready.state, ready.covariance, ready.axes, ready.extra, measured.node, measured.kind,
+        measured.value, measured.variance, measured.lever, measured.gauss_markov, ready.gate,
+        float(outages.patience), states, covariances, innovation, S, nis, verdict,
+    )  # fmt: skip
     for gap in ready.gaps:
         unknown = (times > gap.start) & (times < gap.end)
         states[unknown], covariances[unknown] = np.nan, np.nan

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wildlab.geometry.compilation import announced, compiled
+from wildlab.geometry.compilation import compiled
 from wildlab.geometry.frames import (
     Array,
     Origin,
@@ -472,12 +472,11 @@ def run_observer(
     ready = prepare(imu, start, origin, aiding, gains or Gains(), times, max_gap)
     line, measured = ready.line, ready.measured
     out = np.full((len(times), 16), np.nan)
-    with announced("the nonlinear observer"):
-        observe(
-            line.times, line.f, line.w, line.gap, line.row_of_node, measured.node, measured.kind,
-            measured.value, measured.variance, measured.lever, ready.gains, ready.q, ready.bias, ready.x,
-            ready.P, out,
-        )  # fmt: skip
+    observe(
+        line.times, line.f, line.w, line.gap, line.row_of_node, measured.node, measured.kind,
+        measured.value, measured.variance, measured.lever, ready.gains, ready.q, ready.bias, ready.x,
+        ready.P, out,
+    )  # fmt: skip
     for gap in ready.gaps:
         out[(times > gap.start) & (times < gap.end)] = np.nan
     rows = out[row]

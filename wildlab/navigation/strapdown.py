@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError
-from wildlab.geometry.compilation import announced
 from wildlab.geometry.frames import USUAL_GRAVITY, Array, Earth
 from wildlab.navigation import kernels
 from wildlab.navigation.kernels import Integers
@@ -292,6 +291,5 @@ def integrate_strapdown(
     )
     states = np.full((len(samples.times), 16), np.nan)
     t, f, w = (part[:n] for part in samples)
-    with announced("the strapdown integration"):
-        kernels.integrate(t, f, w, earth.as_array(), start, states[:n])
+    kernels.integrate(t, f, w, earth.as_array(), start, states[:n])
     return DeadReckoning(samples.times, states[:, :3], states[:, 3:6], states[:, 6:10], gaps)

@@ -16,7 +16,7 @@ from scipy.ndimage import maximum_filter, minimum_filter
 
 from wildlab.geometry.camera import Camera, normalise
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.compilation import announced, compiled
+from wildlab.geometry.compilation import compiled
 from wildlab.geometry.frames import Array, Indices, Mask
 from wildlab.geometry.georeference import Terrain
 from wildlab.geometry.viewsheds import image_border, lines_clear, widest_view
@@ -208,10 +208,9 @@ def see(
         float,
     )
     grid = np.array([terrain.north, terrain.east, terrain.step])
-    with announced("the view over terrain"):
-        image, node, distance, points = in_images(
-            terrain.height, grid, lens, first, count, p.copy(), R.copy(), furthest
-        )
+    image, node, distance, points = in_images(
+        terrain.height, grid, lens, first, count, p.copy(), R.copy(), furthest
+    )
     found = Sightings(image, node, distance)
     if not hidden or not len(node):
         return found

@@ -42,17 +42,22 @@ from wildlab.planning.legs import (
 
 
 @compiled
-def inverse_trace(a: float, b: float, c: float, d: float, e: float, f: float) -> float:
-    """tr(Y^-1) of [[a, b, c], [b, d, e], [c, e, f]]; infinite where it is not positive definite."""
+def inverse_trace(y: Any) -> float:
+    """tr(y^-1) of a symmetric matrix (3, 3); infinite where it is not positive definite.
+
+    By pivots rather than by the determinant: where one direction is known ten million times better than
+    another, that loses all digits.
+    """
+    a, b, c = y[0, 0], y[0, 1], y[0, 2]
     if not a > 0:
         return np.inf
     l2, l3 = b / a, c / a
-    d2 = d - b * l2
+    d2 = y[1, 1] - b * l2
     if not d2 > 0:
         return np.inf
-    rest = e - c * l2
+    rest = y[1, 2] - c * l2
     m = rest / d2
-    d3 = f - c * l3 - m * rest
+    d3 = y[2, 2] - c * l3 - m * rest
     if not d3 > 0:
         return np.inf
     return 1 / a + (l2 * l2 + 1) / d2 + ((l2 * m - l3) ** 2 + m * m + 1) / d3
@@ -60,13 +65,8 @@ def inverse_trace(a: float, b: float, c: float, d: float, e: float, f: float) ->
 
 @compiled
 def inverse_traces(Y: Any) -> Any:
-    """tr(Y^-1) of each matrix (N, 3, 3), (N,). By pivots rather than by the determinant: where one direction
-    is known ten million times better than another, that loses all digits."""
-    out = np.empty(len(Y))
-    for i in range(len(Y)):
-        y = Y[i]
-        out[i] = inverse_trace(y[0, 0], y[0, 1], y[0, 2], y[1, 1], y[1, 2], y[2, 2])
-    return out
+    """tr(Y^-1) of each matrix (N, 3, 3), (N,)."""
+    return np.array([inverse_trace(y) for y in Y])
 
 
 @compiled
@@ -74,22 +74,18 @@ def add_image(
     points: Any, near: Any, cam: Any, R: Any, clear: Any, half: Any, sd: float, reach: float,
     nearest: float, into: Any, seen: Any,
 ) -> None:  # fmt: skip
-    """Add to ``into`` (N, 6) what an image tells of the points ``near``, and mark those that it shows.
+    """Add to ``into`` (N, 3, 3) what an image tells of the points ``near``, and mark those that it shows.
 
     ``near`` counts points, ``cam`` (3,), ``R`` (3, 3), ``clear`` (N,) or (0,) where nothing hides anything,
     ``seen`` (N,) bool.
     """
-    px, py, pz = cam[0], cam[1], cam[2]
-    r00, r10, r20 = R[0, 0], R[1, 0], R[2, 0]
-    r01, r11, r21 = R[0, 1], R[1, 1], R[2, 1]
-    r02, r12, r22 = R[0, 2], R[1, 2], R[2, 2]
     all_clear = len(clear) == 0
     for i in near:
-        x, y, z = points[i, 0] - px, points[i, 1] - py, points[i, 2] - pz
-        depth = r02 * x + r12 * y + r22 * z
-        if not depth > 0 or abs(r00 * x + r10 * y + r20 * z) > half[0] * depth:
+        x, y, z = points[i, 0] - cam[0], points[i, 1] - cam[1], points[i, 2] - cam[2]
+        depth = R[0, 2] * x + R[1, 2] * y + R[2, 2] * z
+        if not depth > 0 or abs(R[0, 0] * x + R[1, 0] * y + R[2, 0] * z) > half[0] * depth:
             continue
-        if abs(r01 * x + r11 * y + r21 * z) > half[1] * depth or not (all_clear or clear[i]):
+        if abs(R[0, 1] * x + R[1, 1] * y + R[2, 1] * z) > half[1] * depth or not (all_clear or clear[i]):
             continue
         seen[i] = True
         rho2 = x * x + y * y
@@ -98,13 +94,10 @@ def add_image(
         told = np.exp(-r2 / (reach * reach)) / (sd * sd)
         cos, sin = (x / rho, y / rho) if rho > 0 else (1.0, 0.0)
         turn = told / max(rho, nearest) ** 2
-        u, v, w = cos * z / r2, sin * z / r2, -rho / r2
-        into[i, 0] += sin * sin * turn + told * u * u
-        into[i, 1] += -sin * cos * turn + told * u * v
-        into[i, 2] += told * u * w
-        into[i, 3] += cos * cos * turn + told * v * v
-        into[i, 4] += told * v * w
-        into[i, 5] += told * w * w
+        aside, up = (sin, -cos, 0.0), (cos * z / r2, sin * z / r2, -rho / r2)
+        for a in range(3):
+            for b in range(3):
+                into[i, a, b] += aside[a] * aside[b] * turn + told * up[a] * up[b]
 
 
 @compiled
@@ -133,7 +126,7 @@ def gains_of_steps(
     where the step ends, seen from above. Nothing hides anything.
     """
     out = np.zeros((len(parents), R.shape[1]))
-    into = np.zeros((len(points), 6))
+    into = np.zeros((len(points), 3, 3))
     seen = np.zeros(len(points), np.bool_)
     free = np.ones(0, np.bool_)
     for k in range(len(parents)):
@@ -148,11 +141,8 @@ def gains_of_steps(
             for i in near:
                 if not seen[i]:
                     continue
-                after = inverse_trace(
-                    Y[one, i, 0, 0] + into[i, 0], Y[one, i, 0, 1] + into[i, 1], Y[one, i, 0, 2] + into[i, 2],
-                    Y[one, i, 1, 1] + into[i, 3], Y[one, i, 1, 2] + into[i, 4], Y[one, i, 2, 2] + into[i, 5],
-                )  # fmt: skip
-                out[k, g] += weights[i] * (left[one, i] - after)
+                into[i] += Y[one, i]
+                out[k, g] += weights[i] * (left[one, i] - inverse_trace(into[i]))
                 seen[i] = False
                 into[i] = 0.0
     return out
@@ -168,7 +158,7 @@ def after_images(
     ``cams`` (L, 3), ``R`` (L, 3, 3), or (1, 3, 3) for all, ``counts`` (L,), ``clear`` (L, N) or (0, 0). Gives
     (N,) bool, which points the images show.
     """
-    into = np.zeros((len(points), 6))
+    into = np.zeros((len(points), 3, 3))
     seen = np.zeros(len(points), np.bool_)
     free = np.ones(0, np.bool_)
     near = close_points(points, weights, cams[0], np.inf)
@@ -181,32 +171,19 @@ def after_images(
             )  # fmt: skip
     for i in range(len(points)):
         if seen[i]:
-            y = Y[i]
-            y[0, 0] += into[i, 0]
-            y[1, 1] += into[i, 3]
-            y[2, 2] += into[i, 5]
-            y[0, 1] += into[i, 1]
-            y[0, 2] += into[i, 2]
-            y[1, 2] += into[i, 4]
-            y[1, 0], y[2, 0], y[2, 1] = y[0, 1], y[0, 2], y[1, 2]
-            left[i] = inverse_trace(y[0, 0], y[0, 1], y[0, 2], y[1, 1], y[1, 2], y[2, 2])
+            Y[i] += into[i]
+            left[i] = inverse_trace(Y[i])
     return seen
 
 
-@compiled
 def worth_beyond(left: Any, middles: Any, parents: Any, ends: Any, length: float) -> Any:
     """What is left to know in blocks, counted less the further they are from where a step ends, (K,) m^2.
 
     ``left`` (B, S) of each state's blocks, ``middles`` (S, 2), ``ends`` (K, 2) or more columns, ``length``
     the distance at which a block counts 1/e.
     """
-    out = np.zeros(len(parents))
-    for k in range(len(parents)):
-        for i in range(len(middles)):
-            if left[parents[k], i] > 0:
-                away = np.hypot(middles[i, 0] - ends[k, 0], middles[i, 1] - ends[k, 1])
-                out[k] += left[parents[k], i] * np.exp(-away / length)
-    return out
+    away = np.hypot(*(middles[:, None] - ends[:, :2]).T)
+    return (np.maximum(left[parents], 0.0) * np.exp(-away / length)).sum(axis=1)
 
 
 @compiled
@@ -227,7 +204,7 @@ def grow_old_all(Y: Any, left: Any, q: float) -> None:
         y[2, 2] -= q * (n0 * m0 + n1 * m1)
         y[0, 2], y[1, 2] = m0, m1
         y[1, 0], y[2, 0], y[2, 1] = y[0, 1], m0, m1
-        left[i] = inverse_trace(y[0, 0], y[0, 1], m0, y[1, 1], m1, y[2, 2])
+        left[i] = inverse_trace(y)
 
 
 def detection_probability(

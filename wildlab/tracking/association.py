@@ -19,7 +19,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from wildlab.errors import WildlabError
-from wildlab.geometry.compilation import announced, compiled
+from wildlab.geometry.compilation import compiled
 from wildlab.geometry.frames import Array
 from wildlab.tracking.sensors import difference
 
@@ -188,11 +188,7 @@ def association_probabilities(weights: ArrayLike, missed: ArrayLike, most: int =
         part, none = w[np.ix_(targets, measurements)], w0[targets]
         scale = np.maximum(part.max(axis=1), none)
         part, none = part / scale[:, None], none / scale
-        if min(part.shape) <= most:
-            with announced("whose a measurement is"):
-                own = _exact(part, none)
-        else:
-            own = belief_propagation(part, none)
+        own = (_exact if min(part.shape) <= most else belief_propagation)(part, none)
         if not np.isfinite(own).all():
             raise WildlabError(
                 "targets that cannot be missed share too few measurements",

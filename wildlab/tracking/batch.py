@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.compilation import announced, compiled
+from wildlab.geometry.compilation import compiled
 from wildlab.geometry.frames import Array
 from wildlab.tracking import kalman
 from wildlab.tracking.kalman import LARGEST_CORRELATION, Considered
@@ -110,12 +110,10 @@ def run_batch(
     x, P = (np.full((B, N, *shape), np.nan) for shape in ((4,), (4, 4)))
     innovation, nis = np.full((B, N, 2), np.nan), np.full((B, N), np.nan)
     used, limited = np.zeros((B, N), bool), np.zeros((B, N), bool)
-    kind = "Schmidt" if pose is not None else "Kalman" if view is None else "extended Kalman"
-    with announced(f"the {kind} filter"):
-        singular = filter_runs(
-            F, Q, phis, z, noise, *_camera_arrays(view, N), P_poses, x0, P0, first, x, P, innovation, nis,
-            used, limited,
-        )  # fmt: skip
+    singular = filter_runs(
+        F, Q, phis, z, noise, *_camera_arrays(view, N), P_poses, x0, P0, first, x, P, innovation, nis,
+        used, limited,
+    )  # fmt: skip
     if singular >= 0:
         raise WildlabError(
             f"the innovation covariance S of row {singular} is not positive definite",

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wildlab.geometry.compilation import announced, compiled
+from wildlab.geometry.compilation import compiled
 from wildlab.geometry.frames import Array
 
 Index = NDArray[np.int64]
@@ -105,13 +105,12 @@ def assign_jointly(scans: JointScans, x: Array, P: Array, rule: Rule) -> Index:
     """
     T = len(x)
     ways, sets = _ways(T)
-    with announced("which target a measurement is of"):
-        return _assigned(
-            np.asarray(scans.z, float), np.asarray(scans.F, float), np.asarray(scans.Q, float),
-            np.asarray(scans.unlike, float), np.asarray(scans.number, np.int64),
-            float(scans.own), float(scans.shared), np.asarray(x, float).reshape(-1), np.asarray(P, float),
-            ways, sets, *rule,
-        )  # fmt: skip
+    return _assigned(
+        np.asarray(scans.z, float), np.asarray(scans.F, float), np.asarray(scans.Q, float),
+        np.asarray(scans.unlike, float), np.asarray(scans.number, np.int64),
+        float(scans.own), float(scans.shared), np.asarray(x, float).reshape(-1), np.asarray(P, float),
+        ways, sets, *rule,
+    )  # fmt: skip
 
 
 def _ways(T: int) -> tuple[Index, Index]:
