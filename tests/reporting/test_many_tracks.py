@@ -34,8 +34,6 @@ def shown_at(time: int, names: Iterable[int], x: np.ndarray, P: np.ndarray) -> S
         np.tile(P, (n, 1, 1)),
         np.ones(n),
         np.ones((n, 1)),
-        np.zeros((n, 4, 0)),
-        np.full(n, np.inf),
     )
 
 

@@ -12,14 +12,14 @@ themselves.
 
 Once the flight is over, a track that was ever confirmed is a trajectory from its first measurement on. Back
 over it, which measurements were of which target stays as it was taken at the time, and the covariance knows
-nothing of what was taken wrongly: among many false measurements it is too small. Kinds of hull stay merged,
-and errors that last stay considered: see `wildlab.tracking.run`.
+nothing of what was taken wrongly: among many false measurements it is too small. Errors that last stay
+considered: see `wildlab.tracking.run`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -174,9 +174,7 @@ class Measured(NamedTuple):
 class Shown(NamedTuple):
     """What is believed after a scan: N confirmed targets that move and were seen not long ago.
 
-    ``identity`` (N,), ``x`` (N, 4), ``P`` (N, 4, 4), ``existence`` (N,) and ``kinds`` (N, K); ``C`` (N, 4, k)
-    what each error has in common with those that last, as in `Tracks`; ``until`` (N,) s, when it is shown no
-    longer if it is not seen again.
+    ``identity`` (N,), ``x`` (N, 4), ``P`` (N, 4, 4), ``existence`` (N,) and ``kinds`` (N, K).
     """
 
     time: float
@@ -186,13 +184,6 @@ class Shown(NamedTuple):
     P: Array
     existence: Array
     kinds: Array
-    C: Array
-    until: Array
-
-    def only(self, rows: NDArray[np.intp]) -> Shown:
-        """These, in this order."""
-        parts: list[Any] = [part[rows] for part in self[2:]]
-        return Shown(self.time, self.sensor, *parts)
 
 
 def run_many(
@@ -440,23 +431,23 @@ def _shown(
     tracks: Tracks, scan: Scan, sensors: tuple[ManySensorModel, ...], targets: ManyTargetModel
 ) -> Shown:
     believed = tracks.confirmed & (tracks.moving | (targets.moves_m <= 0))
-    return _present(_merged(tracks, scan, sensors).only(np.flatnonzero(believed)), scan, sensors, targets)
-
-
-def _merged(tracks: Tracks, scan: Scan, sensors: tuple[ManySensorModel, ...]) -> Shown:
-    x, P = tracks.estimate()
-    C = np.einsum("tk,tkij->tij", tracks.kinds, tracks.C)
-    until = tracks.last + np.array([one.patience_s for one in sensors])[tracks.by]
-    return Shown(scan.time, scan.sensor, tracks.identity, x, P, tracks.existence, tracks.kinds, C, until)
+    return _present(tracks.only(np.flatnonzero(believed)), scan, sensors, targets)
 
 
 def _present(
-    found: Shown, scan: Scan, sensors: tuple[ManySensorModel, ...], targets: ManyTargetModel
+    tracks: Tracks,
+    scan: Scan,
+    sensors: tuple[ManySensorModel, ...],
+    targets: ManyTargetModel,
+    shares: Array | None = None,
 ) -> Shown:
-    """Those that exist, within any sensor's reach."""
-    far = max(sensor.far_m for sensor in sensors)
-    near = np.linalg.norm(found.x[:, :2] - scan.platform, axis=1) < far
-    return found.only(np.flatnonzero(near & (found.existence > targets.shown) & (scan.time < found.until)))
+    """Those that exist within any sensor's reach and were seen not long ago; ``shares`` as of `Tracks`."""
+    x, P = tracks.estimate(shares)
+    near = np.linalg.norm(x[:, :2] - scan.platform, axis=1) < max(sensor.far_m for sensor in sensors)
+    recent = scan.time - tracks.last < np.array([one.patience_s for one in sensors])[tracks.by]
+    rows = np.flatnonzero(near & recent & (tracks.existence > targets.shown))
+    parts = (part[rows] for part in (x, P, tracks.existence, tracks.kinds))
+    return Shown(scan.time, scan.sensor, tracks.identity[rows], *parts)
 
 
 def smooth_many(
@@ -468,8 +459,11 @@ def smooth_many(
     """Follow all targets, and go back over them once all scans are known.
 
     A track that was ever shown is a trajectory, from the measurement that it began with: its estimates by
-    Rauch, Tung and Striebel (`wildlab.tracking.run`), its existence by the chain in which what is gone does
-    not come back. It ends where it no longer exists in that light.
+    Rauch, Tung and Striebel (`wildlab.tracking.run`) for each kind of hull by itself, its existence by the
+    chain in which what is gone does not come back. It ends where it no longer exists in that light.
+
+    A scan makes kinds probable by how far measurements scatter, which says nothing of errors that last:
+    smoothed covariances take kinds to be as frequent as they are in general.
 
     Parameters
     ----------
@@ -482,51 +476,53 @@ def smooth_many(
         What was believed after each scan, as of `run_many`, and what is believed in the end.
     """
     order, eyes = sorted(scans, key=lambda one: one.time), tuple(sensors)
-    steps = zip(order, follow_many(order, eyes, targets, lasting_s), strict=True)
-    pairs = [(_merged(tracks, scan, eyes), shown) for scan, (tracks, shown) in steps]
-    filtered = [shown for _, shown in pairs]
+    steps = list(follow_many(order, eyes, targets, lasting_s))
+    filtered = [shown for _, shown in steps]
     believed = list({int(one) for shown in filtered for one in shown.identity})
-    errors = (*lasting_s, *own_lasting(eyes))
+    errors, shares = (*lasting_s, *own_lasting(eyes)), np.array([one.share for one in targets.hulls])
     smoothed: list[Shown] = []
-    ahead: tuple[Shown, Shown, Later] | None = None
-    for scan, (every, _) in zip(reversed(order), reversed(pairs), strict=True):
-        here = every.only(np.flatnonzero(np.isin(every.identity, believed)))
-        now = begin_back(here.x, here.P, len(errors))
-        found, now = (here, now) if ahead is None else _back(here, now, *ahead, targets, errors)
-        ahead = here, found, now
-        smoothed.append(_present(found, scan, eyes, targets))
+    time, ahead = 0.0, None
+    for scan, (tracks, _) in zip(reversed(order), reversed(steps), strict=True):
+        here = tracks.only(np.flatnonzero(np.isin(tracks.identity, believed)))
+        later = begin_back(here.x, here.P, len(errors))
+        final = here if ahead is None else _back(here, later, *ahead, time - scan.time, targets, errors)
+        time, ahead = scan.time, (here, later, final)
+        smoothed.append(_present(final, scan, eyes, targets, shares / shares.sum()))
     return filtered, smoothed[::-1]
 
 
 def _back(
-    here: Shown,
-    now: Later,
-    ahead: Shown,
-    final: Shown,
+    here: Tracks,
     later: Later,
+    ahead: Tracks,
+    after: Later,
+    final: Tracks,
+    dt: float,
     targets: ManyTargetModel,
     errors: Sequence[float],
-) -> tuple[Shown, Later]:
-    """The tracks of a scan in the light of the next one, ``ahead`` as filtered and ``final`` as smoothed;
-    those that it does not have any more stay as they are."""
+) -> Tracks:
+    """The tracks of a scan in the light of the next one, ``ahead`` as filtered and ``final`` as smoothed.
+
+    Those that the next scan does not have any more stay as they are. ``later`` and ``after`` are of this scan
+    and the next; the first is filled.
+    """
     _, mine, its = np.intersect1d(here.identity, ahead.identity, return_indices=True)
-    old, new, final = here.only(mine), ahead.only(its), final.only(its)
-    dt = new.time - old.time
+    old, new, known = here.only(mine), ahead.only(its), final.only(its)
     unit, psi = np.eye(len(errors)), np.diag([fade(dt, one) for one in errors])
     stepped = step_back(
-        Later(*(part[its] for part in later)),
+        Later(*(part[its] for part in after)),
         old.x,
         (old.P, old.C, unit),
         (new.P, new.C, unit),
         *white_acceleration(dt, targets.density),
         psi,
     )
-    for part, known in zip(now, stepped, strict=True):
-        part[mine] = known
-    existence, kinds, until = here.existence.copy(), here.kinds.copy(), here.until.copy()
     lasts = np.exp(-dt / targets.lifetime_s)
     # Of one that does not exist at the next scan: that it did before, and ended.
     ended = old.existence * (1 - lasts) / (1 - old.existence * lasts)
-    existence[mine] = final.existence + (1 - final.existence) * ended
-    kinds[mine], until[mine] = final.kinds, final.until
-    return here._replace(x=now.x, P=now.P, existence=existence, kinds=kinds, until=until), now
+    ended = known.existence + (1 - known.existence) * ended
+    x, P, existence, last, by = later.x, later.P, here.existence.copy(), here.last.copy(), here.by.copy()
+    found = (*later, existence, last, by)
+    for part, value in zip(found, (*stepped, ended, known.last, known.by), strict=True):
+        part[mine] = value
+    return here._replace(x=x, P=P, existence=existence, last=last, by=by)

@@ -14,7 +14,7 @@ from tests.tracking.many.test_update import OPEN, SURE
 from tests.tracking.poses import GENERATORS
 from wildlab.evaluation.consistency import chi_square_interval, nees
 from wildlab.tracking.motion import white_acceleration
-from wildlab.tracking.multitarget import smooth_many
+from wildlab.tracking.multitarget import follow_many, smooth_many
 from wildlab.tracking.run import Start, lasting_errors, run_filter, smooth, smooth_moments
 from wildlab.tracking.sensors import positions
 from wildlab.tracking.target_model import Hull, own_columns, own_lasting
@@ -48,6 +48,31 @@ def test_each_track_is_that_of_kalman_and_rauch_from_its_first_measurement_on(se
                 for row in here:
                     assert found[k].x[row] == pytest.approx(track.x[k - first], rel=1e-6, abs=1e-6)
                     assert found[k].P[row] == pytest.approx(track.P[k - first], rel=1e-4, abs=1e-6)
+
+
+def test_each_kind_of_hull_is_smoothed_by_itself(rng):
+    """Two kinds that differ in how rough they are: two smoothed Kalman filters, their mean as probable as
+    they are, their spread as frequent as they are: what scatters little may lie aside by much."""
+    rough, looks = (0.0, 3.0), 8
+    eye = SURE._replace(rough_m=rough, along_m=(0.0, 0.0), near_side_m=(0.0, 0.0))
+    targets = OPEN._replace(hulls=(Hull("a", 0.0, 0.0, 3.0), Hull("b", 1.0, 1.0, 1.0)), confirmed=0.0, hits=1)
+    z = rng.normal(0, 2, (looks, 2))
+    scans = [look(float(t), z[t]) for t in range(looks)]
+    smoothed = smooth_many(scans, [eye], targets)[1]
+    shares = [tracks.kinds[0] for tracks, _ in follow_many(scans, [eye], targets)]
+    motion, each = partial(white_acceleration, density=targets.density), []
+    for one in rough:
+        R = (1 + one**2) * np.eye(2)
+        P = np.diag([R[0, 0], R[0, 0], 9.0, 9.0])
+        start = Start(0.0, np.array([*z[0], 0.0, 0.0]), P, row=0)
+        each.append(smooth(run_filter(np.arange(float(looks)), z, R, positions(), motion, start), motion))
+    for k, share in enumerate(shares):
+        x, P = np.array([one.x[k] for one in each]), np.array([one.P[k] for one in each])
+        mean = share @ x
+        off = x - mean
+        assert smoothed[k].x[0] == pytest.approx(mean, rel=1e-6, abs=1e-6)
+        P += off[:, :, None] * off[:, None]
+        assert smoothed[k].P[0] == pytest.approx(0.75 * P[0] + 0.25 * P[1], rel=1e-4, abs=1e-6)
 
 
 def test_what_ends_ended_when_it_was_seen_last_and_what_comes_back_was_there():
@@ -109,8 +134,8 @@ def test_errors_are_as_large_as_tracks_of_two_sensors_say():
         for size, one in zip(rough, lasting, strict=True)
     ]
     targets = OPEN._replace(hulls=(boat,), density=0.3, hits=1, confirmed=0.0)
-    # A hundred boats, far apart.
-    rng, count = np.random.default_rng(4), 100
+    # Two hundred boats, far apart.
+    rng, count = np.random.default_rng(4), 200
     state = np.zeros((count, 4))
     state[:, 0], state[:, 2:] = 5e3 * np.arange(count), rng.normal(0, 3.0, (count, 2))
     lasts, way, scans = rng.normal(size=(2, count, 2)), [], []
