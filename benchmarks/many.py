@@ -1,9 +1,9 @@
 """Fifty targets and a hundred measurements a scan on one core; and whose a measurement is, beside Stone Soup.
 
-The first row is everything: predicting, gating, probabilities, existence, estimates, new and ended tracks.
-The others are one scan of targets in a row, near enough for each to compete with the next: probabilities
-summed over all ways, the same way by way for six of them, and Stone Soup's joint probabilistic data
-association for as many as it can enumerate in a second.
+The first row is everything: predicting, gating, probabilities, existence, estimates, new and ended tracks;
+the second has trajectories smoothed too. The others are one scan of targets in a row, near enough for each to
+compete with the next: probabilities summed over all ways, the same way by way for six of them, and Stone
+Soup's joint probabilistic data association for as many as it can enumerate in a second.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from benchmarks.timing import best_of
 from tests.tracking.many.enumeration import association_probabilities_by_enumeration
 from wildlab.geometry.frames import Array
 from wildlab.tracking.association import association_probabilities
-from wildlab.tracking.multitarget import run_many
+from wildlab.tracking.multitarget import run_many, smooth_many
 from wildlab.tracking.target_model import POINT, ManySensorModel, ManyTargetModel, Scan
 
 TARGETS, MEASUREMENTS, SCANS = 50, 100, 60
@@ -90,10 +90,12 @@ def run() -> tuple[str, list[tuple[str, float, float, str]]]:
     """Title and rows (what, seconds, ratio to summing way by way, what is wanted)."""
     given = scans()
     each = best_of(lambda: run_many(given, [EYE], POINTS), repeats=3) / SCANS
+    both = best_of(lambda: smooth_many(given, [EYE], POINTS), repeats=3) / SCANS
     few, many = in_a_row(6), in_a_row(10)
     slow = best_of(lambda: association_probabilities_by_enumeration(*few), repeats=3)
     rows = [
         (f"a scan of {TARGETS} targets, {1 / each:.0f} scans/s", each, each / slow, "at least 20 scans/s"),
+        (f"and back over it, {1 / both:.0f} scans/s", both, both / slow, "at least 20 scans/s"),
         ("6 in a row, way by way", slow, 1.0, ""),
     ]
     for words, weights in (("6", few), ("10", many)):

@@ -27,7 +27,13 @@ def shown_at(time: int, names: Iterable[int], x: np.ndarray, P: np.ndarray) -> S
     n = len(x)
     identity = np.array([*names], int)
     return Shown(
-        float(time), 0, identity, x, np.tile(P, (n, 1, 1)), np.ones(n), np.ones((n, 1)), np.zeros((n, 4, 0))
+        float(time),
+        0,
+        identity,
+        x,
+        np.tile(P, (n, 1, 1)),
+        np.ones(n),
+        np.ones((n, 1)),
     )
 
 

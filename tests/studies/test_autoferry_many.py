@@ -44,7 +44,7 @@ def test_what_it_was_tuned_on_is_in_no_median():
     modes = {"radar": (5.0, 9.0, 7.0), "lidar": (3.0, 4.0, 6.0), "both": (4.0, 8.0, 8.0)}
     rows = pd.DataFrame(
         [
-            base | {"case": case, "mode": mode, "gospa": value}
+            base | {"case": case, "mode": mode, "gospa": value, "gospa_online": value + 1.0}
             for mode, values in modes.items()
             for case, value in zip(("s1", "s2", "s3"), values, strict=True)
         ]
@@ -97,4 +97,4 @@ def test_scenarios_are_followed_by_what_one_teaches(scenario, tunings, monkeypat
     assert -2.5 < errors["radar"].offset_s < -1.5 and errors["lidar"].offset_s == pytest.approx(0, abs=1e-9)
     assert all(0.5 < errors[name].next_correlation < 1 for name in ("lidar", "radar"))
     for mode, best in autoferry.tune_modes(scenario(2), draws=2, seed=1).items():
-        assert autoferry.follow_mode(scenario(3), mode, best.settings) is not None
+        assert autoferry.follow_mode(scenario(3), mode, best.settings)[0] is not None

@@ -571,11 +571,12 @@ def gospa_of(lives: Identities | None) -> float:
     return float(np.mean([one.distance for one in lives.gospa])) if lives is not None else np.inf
 
 
-def follow_mode(flight: Flight, mode: str, settings: Settings) -> Identities | None:
-    """A scenario by the sensors of a mode, beside its true boats."""
-    return score_identities(
-        track_jointly(flight, settings=settings, sensors=MODES[mode]), reach_of(flight, mode), JUDGED_AT
-    )
+def follow_mode(flight: Flight, mode: str, settings: Settings) -> tuple[Identities | None, Identities | None]:
+    """A scenario by the sensors of a mode, beside its true boats: as it is known in the end, and by then."""
+    followed = track_jointly(flight, settings=settings, sensors=MODES[mode])
+    ends = followed, followed._replace(shown=followed.filtered)
+    in_the_end, by_then = (score_identities(one, reach_of(flight, mode), JUDGED_AT) for one in ends)
+    return in_the_end, by_then
 
 
 def anees_of(lives: Identities | None) -> float:
@@ -608,7 +609,7 @@ def tune_modes(flight: Flight, draws: int, seed: int) -> dict[str, Tuned]:
     for number, rng in enumerate(np.random.default_rng(seed).spawn(draws), start=1):
         settings = draw(rng, errors)
         for mode, tuned in found.items():
-            lives = follow_mode(flight, mode, settings)
+            lives, _ = follow_mode(flight, mode, settings)
             tuned.append(Tuned(number, settings, gospa_of(lives), anees_of(lives)))
     return {mode: min(tuned, key=order) for mode, tuned in found.items()}
 
@@ -618,8 +619,8 @@ def order(one: Tuned) -> tuple[bool, float, int]:
     return not SMALLEST <= one.anees <= LARGEST, one.gospa, one.number
 
 
-def row_of(lives: Identities | None, case: str, mode: str) -> dict[str, object]:
-    """One scenario by one mode."""
+def row_of(lives: Identities | None, by_then: Identities | None, case: str, mode: str) -> dict[str, object]:
+    """One scenario by one mode, from `follow_mode`."""
     if lives is None:
         return {"case": case, "mode": mode}
     seen = [life for life in lives.targets.values() if life.visible]
@@ -627,6 +628,7 @@ def row_of(lives: Identities | None, case: str, mode: str) -> dict[str, object]:
         "case": case,
         "mode": mode,
         "gospa": gospa_of(lives),
+        "gospa_online": gospa_of(by_then),
         "rmse": rms_error(lives),
         "tracked": 100 * float(np.mean([life.tracked for life in seen])) if seen else np.nan,
         "swaps": lives.swaps,
@@ -639,7 +641,7 @@ def judge_all(flights: Mapping[str, Flight], tuned: Mapping[str, Tuned]) -> pd.D
     """Every scenario by every mode with its settings."""
     return pd.DataFrame(
         [
-            row_of(follow_mode(flight, mode, tuned[mode].settings), case, mode)
+            row_of(*follow_mode(flight, mode, tuned[mode].settings), case, mode)
             for mode in MODES
             for case, flight in flights.items()
         ]
@@ -647,7 +649,11 @@ def judge_all(flights: Mapping[str, Flight], tuned: Mapping[str, Tuned]) -> pd.D
 
 
 #: Medians over scenarios, by name: of which number of each, and its unit.
-MEDIANS = {"gospa_median": ("gospa", "m"), "tracked_median": ("tracked", "%")}
+MEDIANS = {
+    "gospa_median": ("gospa", "m"),
+    "gospa_online_median": ("gospa_online", "m"),
+    "tracked_median": ("tracked", "%"),
+}
 
 
 def over_scenarios(rows: pd.DataFrame, first: str) -> pd.DataFrame:
@@ -678,7 +684,8 @@ def record_scores(report: Report, rows: pd.DataFrame, first: str) -> dict[str, i
         These changes.
     """
     each = (
-        ("gospa", "gospa", "m"), ("rmse", "rmse", "m"), ("swaps", "swaps", "1"), ("breaks", "breaks", "1"),
+        ("gospa", "gospa", "m"), ("gospa_online", "gospa_online", "m"),
+        ("rmse", "rmse", "m"), ("swaps", "swaps", "1"), ("breaks", "breaks", "1"),
         ("mean_nees_by_two", "anees", "1"),
     )  # fmt: skip
     for _, one in rows.iterrows():

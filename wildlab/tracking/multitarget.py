@@ -10,15 +10,15 @@ them would be used again at the next scan as if it were new. Where errors last, 
 are known well nevertheless; where each scan has another error, they are known no better than the places
 themselves.
 
-Back over the tracks, once the flight is over, which measurements were of which target stays as it was taken
-at the time, and the covariance knows nothing of what was taken wrongly: among many false measurements it is
-too small. Kinds of hull stay merged, and errors that last stay considered: see `wildlab.tracking.run`.
+Once the flight is over, a track that was ever confirmed is a trajectory from its first measurement on. Back
+over it, which measurements were of which target stays as it was taken at the time, and the covariance knows
+nothing of what was taken wrongly: among many false measurements it is too small. Errors that last stay
+considered: see `wildlab.tracking.run`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -27,6 +27,7 @@ from scipy.spatial import cKDTree
 
 from wildlab.geometry.frames import Array
 from wildlab.tracking.association import association_probabilities
+from wildlab.tracking.kalman import fade
 from wildlab.tracking.motion import white_acceleration
 from wildlab.tracking.multitarget_tracks import (
     Compared,
@@ -47,7 +48,7 @@ from wildlab.tracking.multitarget_tracks import (
     weights,
     without_doubles,
 )
-from wildlab.tracking.run import lasting_errors, smooth_moments
+from wildlab.tracking.run import Later, begin_back, step_back
 from wildlab.tracking.target_model import (
     LEAST_KIND,
     ManySensorModel,
@@ -173,8 +174,7 @@ class Measured(NamedTuple):
 class Shown(NamedTuple):
     """What is believed after a scan: N confirmed targets that move and were seen not long ago.
 
-    ``identity`` (N,), ``x`` (N, 4), ``P`` (N, 4, 4), ``existence`` (N,) and ``kinds`` (N, K); ``C`` (N, 4, k)
-    what each error has in common with those that last, as in `Tracks`.
+    ``identity`` (N,), ``x`` (N, 4), ``P`` (N, 4, 4), ``existence`` (N,) and ``kinds`` (N, K).
     """
 
     time: float
@@ -184,7 +184,6 @@ class Shown(NamedTuple):
     P: Array
     existence: Array
     kinds: Array
-    C: Array
 
 
 def run_many(
@@ -431,58 +430,99 @@ def _on_a_known_one(z: Array, tracks: Tracks, targets: ManyTargetModel) -> NDArr
 def _shown(
     tracks: Tracks, scan: Scan, sensors: tuple[ManySensorModel, ...], targets: ManyTargetModel
 ) -> Shown:
-    mean, _ = tracks.estimate()
-    reach = max(sensor.far_m for sensor in sensors)
-    rows = np.flatnonzero(
-        tracks.confirmed
-        & (tracks.existence > targets.shown)
-        & (tracks.moving | (targets.moves_m <= 0))
-        & (scan.time - tracks.last < np.array([one.patience_s for one in sensors])[tracks.by])
-        & (np.linalg.norm(mean[:, :2] - scan.platform, axis=1) < reach)
-    )
-    mine = tracks.only(rows)
-    x, P = mine.estimate()
-    C = np.einsum("tk,tkij->tij", mine.kinds, mine.C)
-    return Shown(scan.time, scan.sensor, mine.identity, x, P, mine.existence, mine.kinds, C)
+    believed = tracks.confirmed & (tracks.moving | (targets.moves_m <= 0))
+    return _present(tracks.only(np.flatnonzero(believed)), scan, sensors, targets)
+
+
+def _present(
+    tracks: Tracks,
+    scan: Scan,
+    sensors: tuple[ManySensorModel, ...],
+    targets: ManyTargetModel,
+    shares: Array | None = None,
+) -> Shown:
+    """Those that exist within any sensor's reach and were seen not long ago; ``shares`` as of `Tracks`."""
+    x, P = tracks.estimate(shares)
+    near = np.linalg.norm(x[:, :2] - scan.platform, axis=1) < max(sensor.far_m for sensor in sensors)
+    recent = scan.time - tracks.last < np.array([one.patience_s for one in sensors])[tracks.by]
+    rows = np.flatnonzero(near & recent & (tracks.existence > targets.shown))
+    parts = (part[rows] for part in (x, P, tracks.existence, tracks.kinds))
+    return Shown(scan.time, scan.sensor, tracks.identity[rows], *parts)
 
 
 def smooth_many(
-    shown: Sequence[Shown], density: float, lasting_s: Sequence[float] = ()
-) -> list[tuple[Array, Array]]:
-    """Smoothed estimates of all tracks at all scans.
+    scans: Sequence[Scan],
+    sensors: Sequence[ManySensorModel],
+    targets: ManyTargetModel,
+    lasting_s: Sequence[float] = (),
+) -> tuple[list[Shown], list[Shown]]:
+    """Follow all targets, and go back over them once all scans are known.
 
-    Where a track was not shown for a while, it is smoothed on either side by itself: what its filter learnt
-    meanwhile is not known here.
+    A track that was ever shown is a trajectory, from the measurement that it began with: its estimates by
+    Rauch, Tung and Striebel (`wildlab.tracking.run`) for each kind of hull by itself, its existence by the
+    chain in which what is gone does not come back. It ends where it no longer exists in that light.
+
+    A scan makes kinds probable by how far measurements scatter, which says nothing of errors that last:
+    smoothed covariances take kinds to be as frequent as they are in general.
 
     Parameters
     ----------
-    shown
-        From `run_many`.
-    density
-        `ManyTargetModel.density` that it was run with.
-    lasting_s
-        As `run_many` was given; behind it `wildlab.tracking.target_model.own_lasting` of its sensors.
+    scans, sensors, targets, lasting_s
+        As in `run_many`.
 
     Returns
     -------
-    list of x, P
-        For each scan (N, 4) and (N, 4, 4), in the order of its ``identity``.
+    filtered, smoothed
+        What was believed after each scan, as of `run_many`, and what is believed in the end.
     """
-    motion = partial(white_acceleration, density=density)
-    after = [(one.x.copy(), one.P.copy()) for one in shown]
-    rows: dict[int, list[tuple[int, int]]] = {}
-    for scan, one in enumerate(shown):
-        for place, identity in enumerate(one.identity.tolist()):
-            rows.setdefault(identity, []).append((scan, place))
-    for where in rows.values():
-        scans = np.array([scan for scan, _ in where])
-        for part in np.split(np.arange(len(where)), np.flatnonzero(np.diff(scans) > 1) + 1):
-            mine = [where[k] for k in part]
-            times = np.array([shown[scan].time for scan, _ in mine])
-            x, P, C = (
-                np.array([getattr(shown[scan], name)[place] for scan, place in mine]) for name in "xPC"
-            )
-            x, P = smooth_moments(times, x, P, C, motion, lasting_errors(lasting_s, len(mine)))
-            for (scan, place), mean, covariance in zip(mine, x, P, strict=True):
-                after[scan][0][place], after[scan][1][place] = mean, covariance
-    return after
+    order, eyes = sorted(scans, key=lambda one: one.time), tuple(sensors)
+    steps = list(follow_many(order, eyes, targets, lasting_s))
+    filtered = [shown for _, shown in steps]
+    believed = list({int(one) for shown in filtered for one in shown.identity})
+    errors, shares = (*lasting_s, *own_lasting(eyes)), np.array([one.share for one in targets.hulls])
+    smoothed: list[Shown] = []
+    time, ahead = 0.0, None
+    for scan, (tracks, _) in zip(reversed(order), reversed(steps), strict=True):
+        here = tracks.only(np.flatnonzero(np.isin(tracks.identity, believed)))
+        later = begin_back(here.x, here.P, len(errors))
+        final = here if ahead is None else _back(here, later, *ahead, time - scan.time, targets, errors)
+        time, ahead = scan.time, (here, later, final)
+        smoothed.append(_present(final, scan, eyes, targets, shares / shares.sum()))
+    return filtered, smoothed[::-1]
+
+
+def _back(
+    here: Tracks,
+    later: Later,
+    ahead: Tracks,
+    after: Later,
+    final: Tracks,
+    dt: float,
+    targets: ManyTargetModel,
+    errors: Sequence[float],
+) -> Tracks:
+    """The tracks of a scan in the light of the next one, ``ahead`` as filtered and ``final`` as smoothed.
+
+    Those that the next scan does not have any more stay as they are. ``later`` and ``after`` are of this scan
+    and the next; the first is filled.
+    """
+    _, mine, its = np.intersect1d(here.identity, ahead.identity, return_indices=True)
+    old, new, known = here.only(mine), ahead.only(its), final.only(its)
+    unit, psi = np.eye(len(errors)), np.diag([fade(dt, one) for one in errors])
+    stepped = step_back(
+        Later(*(part[its] for part in after)),
+        old.x,
+        (old.P, old.C, unit),
+        (new.P, new.C, unit),
+        *white_acceleration(dt, targets.density),
+        psi,
+    )
+    lasts = np.exp(-dt / targets.lifetime_s)
+    # Of one that does not exist at the next scan: that it did before, and ended.
+    ended = old.existence * (1 - lasts) / (1 - old.existence * lasts)
+    ended = known.existence + (1 - known.existence) * ended
+    x, P, existence, last, by = later.x, later.P, here.existence.copy(), here.last.copy(), here.by.copy()
+    found = (*later, existence, last, by)
+    for part, value in zip(found, (*stepped, ended, known.last, known.by), strict=True):
+        part[mine] = value
+    return here._replace(x=x, P=P, existence=existence, last=last, by=by)

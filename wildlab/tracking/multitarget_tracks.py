@@ -252,12 +252,13 @@ class Tracks(NamedTuple):
         parts: list[Any] = [one[rows] for one in self[:-1]]
         return Tracks._make([*parts, tuple(self.trail[row] for row in rows)])
 
-    def estimate(self) -> tuple[Array, Array]:
-        """(T, 4) and (T, 4, 4): the kinds merged to one."""
+    def estimate(self, shares: Array | None = None) -> tuple[Array, Array]:
+        """(T, 4) and (T, 4, 4): the kinds merged, in ``shares`` (K,) for their spread, else as probable."""
         mean = np.einsum("tk,tki->ti", self.kinds, self.x)
         apart = self.x - mean[:, None]
         P = self.P + apart[..., :, None] * apart[..., None, :]
-        return mean, np.einsum("tk,tkij->tij", self.kinds, P)
+        weight = self.kinds if shares is None else np.broadcast_to(shares, self.kinds.shape)
+        return mean, np.einsum("tk,tkij->tij", weight, P)
 
 
 def no_tracks(kinds: int, sensors: int, errors: int = 0) -> Tracks:

@@ -41,7 +41,6 @@ from wildlab.tracking.kalman import (
     errors_of,
     limit_cross,
     predict,
-    root_of_covariance,
     spread_of_prediction,
     update_schmidt,
 )
@@ -622,45 +621,96 @@ def smooth_moments(
         With all measurements.
     """
     after, spread = x.copy(), P.copy()
-    n, known = x.shape[1], errors.covariance
-    A, B, N = np.eye(n), np.zeros(C.shape[1:]), np.zeros((n, n))
+    later = begin_back(x[-1], P[-1], C.shape[-1])
     for row in range(len(times) - 2, -1, -1):
         dt = float(times[row + 1] - times[row])
-        F, Q = motion(dt)
-        psi = errors.transition(row + 1, dt)
-        ahead = _joint(F @ P[row] @ F.T + Q, F @ C[row] @ psi.T, known[row + 1])
-        sd = np.sqrt(np.maximum(np.diag(ahead), 0))
-        # What is left after the measurement of the errors before it.
-        root, inverse = root_of_covariance(ahead[:n, :n])
-        size, axes = np.linalg.eigh(inverse @ P[row + 1] @ inverse.T)
-        cross = np.hstack([(root @ axes * np.minimum(size, 1)) @ axes.T @ root.T, C[row + 1]])
-        kept = _over(cross, ahead, sd)
-        values, axes = np.linalg.eigh(P[row + 1] - kept @ cross.T)
-        N = N + A @ (axes * np.maximum(values, 0)) @ axes.T @ A.T
-        A, B = A @ kept[:, :n], A @ kept[:, n:] + B
-        D = np.hstack([np.eye(n) - A, -B])
-        G = _over(np.hstack([P[row] @ F.T, C[row] @ psi.T]) @ D.T, D @ ahead @ D.T + N, sd[:n])
-        after[row] = x[row] + G @ (after[row + 1] - F @ x[row])
-        grown = known[row + 1] - psi @ known[row] @ psi.T
-        by_noise, by_errors = G @ (A - np.eye(n)), G @ B
-        N = by_noise @ Q @ by_noise.T + by_errors @ grown @ by_errors.T + G @ N @ G.T
-        A, B = np.eye(n) + by_noise @ F, by_errors @ psi
-        both = np.hstack([A, B])
-        smoothed = both @ _joint(P[row], C[row], known[row]) @ both.T + N
-        spread[row] = (smoothed + smoothed.T) / 2
+        ahead = P[row + 1], C[row + 1], errors.covariance[row + 1]
+        here = P[row], C[row], errors.covariance[row]
+        later = step_back(later, x[row], here, ahead, *motion(dt), errors.transition(row + 1, dt))
+        after[row], spread[row] = later.x, later.P
     return after, spread
 
 
+class Later(NamedTuple):
+    """Smoothed ``x`` (..., n) and ``P`` (..., n, n) at a row, and ``A``, ``B`` and ``N`` of its error."""
+
+    x: Array
+    P: Array
+    A: Array
+    B: Array
+    N: Array
+
+
+def begin_back(x: Array, P: Array, errors: int) -> Later:
+    """The last row, which knows nothing later."""
+    none = np.zeros(P.shape)
+    return Later(x.copy(), P.copy(), none + np.eye(x.shape[-1]), np.zeros((*x.shape, errors)), none)
+
+
+#: ``P`` (..., n, n), ``C`` (..., n, k) and the covariance of the errors (k, k) after a row's measurement.
+Moments = tuple[Array, Array, Array]
+
+
+def step_back(later: Later, x: Array, here: Moments, ahead: Moments, F: Array, Q: Array, psi: Array) -> Later:
+    """One row back, see the module; any number of tracks at once."""
+    (P, C, known), (P_next, C_next, known_next) = here, ahead
+    n, (_, _, A, B, N) = x.shape[-1], later
+    eye = np.eye(n)
+    before = _joint(F @ P @ F.T + Q, F @ C @ psi.T, known_next)
+    sd = np.sqrt(np.maximum(np.diagonal(before, axis1=-2, axis2=-1), 0))
+    # What is left after the measurement of the errors before it.
+    root, inverse = _root(before[..., :n, :n], sd[..., :n])
+    size, axes = np.linalg.eigh(inverse @ P_next @ _t(inverse))
+    axes = root @ axes
+    cross = np.concatenate([axes * np.minimum(size, 1)[..., None, :] @ _t(axes), C_next], axis=-1)
+    kept = _over(cross, before, sd)
+    values, axes = np.linalg.eigh(P_next - kept @ _t(cross))
+    axes = A @ axes
+    N = N + axes * np.maximum(values, 0)[..., None, :] @ _t(axes)
+    A, B = A @ kept[..., :n], A @ kept[..., n:] + B
+    D = np.concatenate([eye - A, -B], axis=-1)
+    to = np.concatenate([P @ F.T, C @ psi.T], axis=-1)
+    G = _over(to @ _t(D), D @ before @ _t(D) + N, sd[..., :n])
+    grown = known_next - psi @ known @ psi.T
+    by_noise, by_errors = G @ (A - eye), G @ B
+    N = by_noise @ Q @ _t(by_noise) + by_errors @ grown @ _t(by_errors) + G @ N @ _t(G)
+    A, B = eye + by_noise @ F, by_errors @ psi
+    both = np.concatenate([A, B], axis=-1)
+    spread = both @ _joint(P, C, known) @ _t(both) + N
+    back = (G @ (later.x - x @ F.T)[..., None])[..., 0]
+    return Later(x + back, (spread + _t(spread)) / 2, A, B, N)
+
+
+def _t(matrix: Array) -> Array:
+    return np.swapaxes(matrix, -1, -2)
+
+
 def _joint(P: Array, C: Array, P_errors: Array) -> Array:
-    return np.block([[P, C], [C.T, P_errors]])
+    P_errors = np.broadcast_to(P_errors, (*P.shape[:-2], *P_errors.shape))
+    upper, lower = np.concatenate([P, C], axis=-1), np.concatenate([_t(C), P_errors], axis=-1)
+    return np.concatenate([upper, lower], axis=-2)
+
+
+def _axes(covariance: Array, sd: Array) -> tuple[Array, Array, Array]:
+    """``1 / sd``, and the variances and axes (..., n, n) of what is scaled by it, negligible ones zero."""
+    unit = np.divide(1, sd, out=np.zeros_like(sd), where=sd > 0)
+    values, axes = np.linalg.eigh((covariance + _t(covariance)) / 2 * unit[..., None] * unit[..., None, :])
+    return unit, np.where(values > NEGLIGIBLE, values, 0.0), axes
+
+
+def _root(covariance: Array, sd: Array) -> tuple[Array, Array]:
+    """``A`` with ``A A'`` the covariance, and its inverse where there is variance."""
+    unit, values, axes = _axes(covariance, sd)
+    lengths = np.sqrt(values)[..., None, :]
+    inverse = np.divide(1, lengths, out=np.zeros_like(lengths), where=lengths > 0)
+    return sd[..., None] * axes * lengths, _t(unit[..., None] * axes * inverse)
 
 
 def _over(cross: Array, covariance: Array, sd: Array) -> Array:
     """``cross covariance^-1``; directions whose variances are nothing beside ``sd`` squared are left out."""
-    unit = np.divide(1, sd, out=np.zeros_like(sd), where=sd > 0)
-    values, vectors = np.linalg.eigh((covariance + covariance.T) / 2 * np.outer(unit, unit))
-    inverse = np.divide(1, values, out=np.zeros_like(values), where=values > NEGLIGIBLE)
-    return np.asarray(((cross * unit) @ vectors * inverse) @ vectors.T * unit, float)
+    unit, values, axes = _axes(covariance, sd)
+    inverse = np.divide(1, values, out=np.zeros_like(values), where=values > 0)[..., None, :]
+    return np.asarray(((cross * unit[..., None, :]) @ axes * inverse) @ _t(axes) * unit[..., None, :])
 
 
 def known_before(covariance: Array) -> Array:

@@ -147,7 +147,7 @@ def test_a_heading_that_is_off_is_in_the_covariance_of_tracks():
     for considered in ("", "[sensors.radar.considered.heading]\nsd_deg = 3.0\n"):
         followed = track_jointly(flight, settings=parse_settings(NOISE + considered))
         own = []
-        for one in followed.shown[20:]:
+        for one in followed.filtered[20:]:
             e = one.x[:, :2] - boat(np.array([one.time]))
             own += [float(a @ np.linalg.solve(P[:2, :2], a) / 2) for a, P in zip(e, one.P, strict=True)]
         nees.append(np.mean(own))

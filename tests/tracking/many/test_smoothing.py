@@ -9,69 +9,83 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.tracking.many.test_run import look
+from tests.tracking.many.test_run import EYE, POINTS, look
 from tests.tracking.many.test_update import OPEN, SURE
 from tests.tracking.poses import GENERATORS
 from wildlab.evaluation.consistency import chi_square_interval, nees
 from wildlab.tracking.motion import white_acceleration
-from wildlab.tracking.multitarget import Shown, run_many, smooth_many
-from wildlab.tracking.run import Start, Track, lasting_errors, run_filter, smooth, smooth_moments
+from wildlab.tracking.multitarget import follow_many, smooth_many
+from wildlab.tracking.run import Start, lasting_errors, run_filter, smooth, smooth_moments
 from wildlab.tracking.sensors import positions
 from wildlab.tracking.target_model import Hull, own_columns, own_lasting
 
 H = np.eye(2, 4)
 
 
-def shown(time: float, names: list[int], x: np.ndarray, P: np.ndarray) -> Shown:
-    count = len(names)
-    return Shown(
-        time, 0, np.array(names, np.int64), np.asarray(x, float).reshape(count, 4),
-        np.asarray(P, float).reshape(count, 4, 4), np.ones(count), np.ones((count, 1)),
-        np.zeros((count, 4, 0)),
-    )  # fmt: skip
-
-
-def filtered(seed: int, density: float) -> Track:
-    """One target by the filter of one target, at uneven times."""
+@given(st.integers(0, 10_000), st.sampled_from([0.0, 0.05, 2.0]))
+@settings(max_examples=20, deadline=None)
+def test_each_track_is_that_of_kalman_and_rauch_from_its_first_measurement_on(seed, density):
+    """Three targets far apart, at uneven times; the last begins later than the others."""
     rng = np.random.default_rng(seed)
-    times, z = np.cumsum(rng.uniform(0.2, 3.0, 6)), rng.normal(0, 5, (6, 2))
-    start = Start(times[0], np.zeros(4), np.diag([25.0, 25.0, 4.0, 4.0]))
-    return run_filter(times, z, np.eye(2), positions(), partial(white_acceleration, density=density), start)
+    targets, looks, late = OPEN._replace(density=density, hits=4), 7, 2
+    times, z = np.cumsum(rng.uniform(0.2, 3.0, looks)), rng.normal(0, 1, (looks, 3, 2))
+    z[..., 0] += 1e5 * np.arange(3)
+    scans = [look(t, *(at if k >= late else at[:2])) for k, (t, at) in enumerate(zip(times, z, strict=True))]
+    filtered, smoothed = smooth_many(scans, [SURE], targets)
+    motion = partial(white_acceleration, density=density)
+    for name in range(3):
+        first = late if name == 2 else 0
+        P = np.diag([1.0, 1.0, 9.0, 9.0])
+        start = Start(times[first], np.array([*z[first, name], 0.0, 0.0]), P, row=0)
+        own = times[first:], z[first:, name]
+        one = run_filter(*own, np.eye(2), positions(), motion, start)
+        right = smooth(one, motion)
+        for k in range(looks):
+            for found, track in ((filtered, one), (smoothed, right)):
+                here = np.flatnonzero(found[k].identity == name)
+                # Believed by the filter from the fourth sighting on, and in the end from the first.
+                assert len(here) == (k >= (first if found is smoothed else first + 3))
+                for row in here:
+                    assert found[k].x[row] == pytest.approx(track.x[k - first], rel=1e-6, abs=1e-6)
+                    assert found[k].P[row] == pytest.approx(track.P[k - first], rel=1e-4, abs=1e-6)
 
 
-@given(st.integers(0, 10_000), st.floats(0.05, 2.0))
-@settings(max_examples=30, deadline=None)
-def test_each_track_is_smoothed_by_itself_and_on_either_side_of_an_absence(seed, density):
-    one = filtered(seed, density)
-    other = one.x[::-1], one.P[::-1]
-    alone = smooth(one, partial(white_acceleration, density=density))
-    # The other one changes places with it in the rows, and is absent at the fourth look.
-    looks, orders = [], ([1, 2], [2, 1], [1, 2], [1], [1, 2], [2, 1])
-    for k, order in enumerate(orders):
-        x, P = (
-            np.array([(mine[k], its[k])[n - 1] for n in order])
-            for mine, its in zip(one[1:3], other, strict=True)
-        )
-        looks.append(shown(one.times[k], order, x, P))
-    after = smooth_many(looks, density)
-    for k, order in enumerate(orders):
-        x, P = (part[order.index(1)] for part in after[k])
-        assert x == pytest.approx(alone.x[k], rel=1e-5, abs=1e-5)
-        assert pytest.approx(alone.P[k], rel=1e-4, abs=1e-5) == P
-    # Its last look before the absence and its last of all know nothing later.
-    for k in (2, 5):
-        assert np.allclose(after[k][0][orders[k].index(2)], other[0][k])
+def test_each_kind_of_hull_is_smoothed_by_itself(rng):
+    """Two kinds that differ in how rough they are: two smoothed Kalman filters, their mean as probable as
+    they are, their spread as frequent as they are: what scatters little may lie aside by much."""
+    rough, looks = (0.0, 3.0), 8
+    eye = SURE._replace(rough_m=rough, along_m=(0.0, 0.0), near_side_m=(0.0, 0.0))
+    targets = OPEN._replace(hulls=(Hull("a", 0.0, 0.0, 3.0), Hull("b", 1.0, 1.0, 1.0)), confirmed=0.0, hits=1)
+    z = rng.normal(0, 2, (looks, 2))
+    scans = [look(float(t), z[t]) for t in range(looks)]
+    smoothed = smooth_many(scans, [eye], targets)[1]
+    shares = [tracks.kinds[0] for tracks, _ in follow_many(scans, [eye], targets)]
+    motion, each = partial(white_acceleration, density=targets.density), []
+    for one in rough:
+        R = (1 + one**2) * np.eye(2)
+        P = np.diag([R[0, 0], R[0, 0], 9.0, 9.0])
+        start = Start(0.0, np.array([*z[0], 0.0, 0.0]), P, row=0)
+        each.append(smooth(run_filter(np.arange(float(looks)), z, R, positions(), motion, start), motion))
+    for k, share in enumerate(shares):
+        x, P = np.array([one.x[k] for one in each]), np.array([one.P[k] for one in each])
+        mean = share @ x
+        off = x - mean
+        assert smoothed[k].x[0] == pytest.approx(mean, rel=1e-6, abs=1e-6)
+        P += off[:, :, None] * off[:, None]
+        assert smoothed[k].P[0] == pytest.approx(0.75 * P[0] + 0.25 * P[1], rel=1e-4, abs=1e-6)
 
 
-def test_a_target_at_rest_is_where_all_measurements_say():
-    z = np.random.default_rng(0).normal(0, 5, (6, 2))
-    start = Start(0.0, np.zeros(4), np.diag([25.0, 25.0, 0.0, 0.0]))
-    still = partial(white_acceleration, density=0.0)
-    one = run_filter(np.arange(1.0, 7.0), z, np.eye(2), positions(), still, start)
-    after = smooth_many([shown(one.times[k], [1], one.x[k], one.P[k]) for k in range(6)], 0.0)
-    for x, P in after:
-        np.testing.assert_allclose(x[0], one.x[-1], atol=1e-12)
-        np.testing.assert_allclose(P[0], one.P[-1], atol=1e-12)
+def test_what_ends_ended_when_it_was_seen_last_and_what_comes_back_was_there():
+    """Ten scans with, ten without; and the same with ten more behind them."""
+    seen = [look(float(t), [0.0, 0.0]) for t in range(10)]
+    none = [look(float(t)) for t in range(10, 20)]
+    again = [look(float(t), [0.0, 0.0]) for t in range(20, 30)]
+    eye, targets = EYE._replace(patience_s=5.5), POINTS._replace(lifetime_s=20.0, hidden_s=20.0)
+    online, gone = smooth_many([*seen, *none], [eye], targets)
+    back = smooth_many([*seen, *none, *again], [eye], targets)[1]
+    counts = [[len(one.identity) for one in some] for some in (online, gone, back)]
+    assert counts[0][:2] == [0, 0] and 10 <= sum(counts[1]) < sum(counts[0][2:]) + 2
+    assert counts[2] == [1] * 30 and (np.array([one.existence[0] for one in back[:21]]) > 0.99).all()
 
 
 @given(GENERATORS)
@@ -120,8 +134,8 @@ def test_errors_are_as_large_as_tracks_of_two_sensors_say():
         for size, one in zip(rough, lasting, strict=True)
     ]
     targets = OPEN._replace(hulls=(boat,), density=0.3, hits=1, confirmed=0.0)
-    # A hundred boats, far apart.
-    rng, count = np.random.default_rng(4), 100
+    # Two hundred boats, far apart.
+    rng, count = np.random.default_rng(4), 200
     state = np.zeros((count, 4))
     state[:, 0], state[:, 2:] = 5e3 * np.arange(count), rng.normal(0, 3.0, (count, 2))
     lasts, way, scans = rng.normal(size=(2, count, 2)), [], []
@@ -135,19 +149,15 @@ def test_errors_are_as_large_as_tracks_of_two_sensors_say():
         way.append(state[:, :2])
         F, Q = white_acceleration(0.5, targets.density)
         state = state @ F.T + rng.multivariate_normal(np.zeros(4), Q, count)
-    found = run_many(scans, eyes, targets)
-    white = run_many(scans, [one._replace(correlation=0.0) for one in eyes], targets)
-    given = {
-        "filter": [(one.x, one.P) for one in found],
-        "smoothed": smooth_many(found, targets.density, own_lasting(eyes)),
-        "white": smooth_many(white, targets.density),
-    }
+    white = [one._replace(correlation=0.0) for one in eyes]
+    filtered, smoothed = smooth_many(scans, eyes, targets)
+    given = {"filter": filtered, "smoothed": smoothed, "white": smooth_many(scans, white, targets)[1]}
     low, high = chi_square_interval(2, runs=count)
     means: dict[str, list[float]] = {name: [] for name in given}
     for name, states in given.items():
         for k in range(3, 28, 12):
-            assert found[k].identity.tolist() == list(range(count))
-            e, P = way[k] - states[k][0][:, :2], states[k][1][:, :2, :2]
+            assert states[k].identity.tolist() == list(range(count))
+            e, P = way[k] - states[k].x[:, :2], states[k].P[:, :2, :2]
             means[name].append(float(nees(e, P).mean()))
         # Errors of one boat are correlated: the band is of as many values as there are boats.
     assert all(low < np.mean(means[name]) < high for name in ("filter", "smoothed")), means

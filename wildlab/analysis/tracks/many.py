@@ -36,8 +36,8 @@ from wildlab.flight.manifest import (
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
 from wildlab.paths import DATA
-from wildlab.tracking.multitarget import Shown, run_many, smooth_many
-from wildlab.tracking.target_model import Hull, ManySensorModel, ManyTargetModel, Scan, own_lasting
+from wildlab.tracking.multitarget import Shown, smooth_many
+from wildlab.tracking.target_model import Hull, ManySensorModel, ManyTargetModel, Scan
 
 #: How probable it is that what is in view is detected, where nobody says.
 DETECTION = 0.8
@@ -243,9 +243,9 @@ class ManyTracks(NamedTuple):
 
     Attributes
     ----------
-    scans, named, shown
-        Looks of all sensors in order of time, the targets that detections of each name, and what is believed
-        after it.
+    scans, named, shown, filtered
+        Looks of all sensors in order of time, the targets that detections of each name, what is believed of
+        that moment in the end, and what was believed by then (`wildlab.tracking.multitarget.smooth_many`).
     places
         By sensor.
     sensors, targets
@@ -275,6 +275,7 @@ class ManyTracks(NamedTuple):
     scans: list[Scan]
     named: list[frozenset[str]]
     shown: list[Shown]
+    filtered: list[Shown]
     places: dict[str, PlacedScans]
     sensors: list[ManySensorModel]
     targets: ManyTargetModel
@@ -359,7 +360,7 @@ def track_jointly(
     ]
     pairs.sort(key=lambda pair: pair[0].time)
     scans = [scan for scan, _ in pairs]
-    shown = run_many(scans, models, targets, lasting_s)
+    filtered, shown = smooth_many(scans, models, targets, lasting_s)
     truth, truth_sd, estimated = dict[str, Array](), dict[str, float](), list[str]()
     if flight.truth is not None and len(flight.truth):
         known = truths_at(flight, [scan.time for scan in scans])
@@ -369,6 +370,7 @@ def track_jointly(
         scans,
         [names for _, names in pairs],
         shown,
+        filtered,
         places,
         models,
         targets,
@@ -464,38 +466,39 @@ def score_identities(
 
 
 def tracks_table(followed: ManyTracks) -> pd.DataFrame:
-    """Every track at every scan at which it was shown.
+    """Every track at every scan at which it was shown, then or in the end.
 
     Returns
     -------
     DataFrame
-        ``time_s``, ``sensor`` of the scan, ``track``; the state in metres and m/s in n, ``p_ij`` its
-        covariance, the upper triangle; ``existence``; the probability of each kind of hull; and the place
-        once the flight is over (`smooth_many`), ``smoothed_``. Its covariance is left out where nobody says
-        of a sensor how long its errors last: an error that lasts is averaged by no smoother, which would take
-        it for noise and report a third of the error that is there.
+        ``time_s``, ``sensor`` of the scan, ``track``; what was known by then, NaN where it was not believed
+        yet: the state in metres and m/s in n, ``p_ij`` its covariance, the upper triangle, ``existence``, and
+        the probability of each kind of hull. What is known in the end, from the first measurement of a track
+        on: ``smoothed_`` place and ``smoothed_existence``. The covariance of that place is left out where
+        nobody says of a sensor how long its errors last: an error that lasts is averaged by no smoother,
+        which would take it for noise and report a third of the error that is there.
     """
-    shown = followed.shown
-    counts = [len(one.identity) for one in shown]
-    if not sum(counts):
-        return pd.DataFrame(columns=["time_s", "sensor", "track", "north_m", "east_m"])
-    x, P, kinds = (
-        np.concatenate(part) for part in zip(*((one.x, one.P, one.kinds) for one in shown), strict=True)
+    last = _rows_of(followed.shown)
+    kept = {"north_m": "smoothed_north_m", "east_m": "smoothed_east_m", "existence": "smoothed_existence"}
+    if not followed.unknown_correlation:
+        kept |= {f"p_{a}{b}": f"smoothed_p_{a}{b}" for a in range(2) for b in range(a, 2)}
+    last = last[["scan", "track", *kept]].rename(columns=kept)
+    table = _rows_of(followed.filtered).merge(last, on=["scan", "track"], how="outer", sort=True)
+    names = [followed.sensors[scan.sensor].name for scan in followed.scans]
+    for name, values in (("sensor", names), ("time_s", [scan.time for scan in followed.scans])):
+        table.insert(0, name, [values[row] for row in table["scan"]])
+    return table.drop(columns="scan")
+
+
+def _rows_of(shown: Sequence[Shown]) -> pd.DataFrame:
+    """A row for every track of every scan."""
+    x, P, existence, kinds, track = (
+        np.concatenate([getattr(one, name) for one in shown])
+        for name in ("x", "P", "existence", "kinds", "identity")
     )
-    names = np.array([one.name for one in followed.sensors], object)
-    lasting_s = (*followed.lasting_s, *own_lasting(followed.sensors))
-    after = smooth_many(shown, followed.targets.density, lasting_s)
-    later_x, later_P = (np.concatenate(part) for part in zip(*after, strict=True))
-    columns: dict[str, object] = {
-        "time_s": np.repeat([one.time for one in shown], counts),
-        "sensor": np.repeat(names[[one.sensor for one in shown]], counts),
-        "track": np.concatenate([one.identity for one in shown]).astype(int),
-    }
+    columns = {"scan": np.repeat(np.arange(len(shown)), [len(one.identity) for one in shown]), "track": track}
     columns |= dict(zip(STATE, x.T, strict=True))
     columns |= {f"p_{a}{b}": P[:, a, b] for a in range(4) for b in range(a, 4)}
-    columns["existence"] = np.concatenate([one.existence for one in shown])
+    columns["existence"] = existence
     columns |= {f"kind_{number}": share for number, share in enumerate(kinds.T, start=1)}
-    columns |= {"smoothed_north_m": later_x[:, 0], "smoothed_east_m": later_x[:, 1]}
-    if not followed.unknown_correlation:
-        columns |= {f"smoothed_p_{a}{b}": later_P[:, a, b] for a in range(2) for b in range(a, 2)}
     return pd.DataFrame(columns)
