@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
+import glob
 import io
 import os
+import re
 import shutil
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -385,6 +388,8 @@ SHORTEST = 12
 
 #: How the name of a `private_folder` begins, and the file in it that says it is one.
 _PREFIX, _MARK = "wildlab-share-", ".wildlab-private"
+#: How the name of a file ends that is written and not finished, see `wildlab.files.write_atomic`.
+_PART = re.compile(r"\.[a-z0-9_]{8}")
 #: Waits until the process that started it is gone, however it ended, and removes a folder until it stays
 #: away: what that process had started may still write into it.
 _WATCH = """
@@ -490,8 +495,13 @@ def zip_bytes(files: Mapping[str, bytes], password: str | None = None) -> bytes:
     return whole.getvalue()
 
 
+#: Nobody writes longer than that on a copy (s).
+LEFT_S = 3600.0
+
+
 def put(content: bytes, target: Path, overwrite: bool, mode: int = 0o644) -> None:
-    """Write a finished file, whole or not at all.
+    """Write a finished file, whole or not at all; half of one that a machine left when it stopped goes, after
+    an hour: before, another copy may be writing it.
 
     Raises
     ------
@@ -500,4 +510,9 @@ def put(content: bytes, target: Path, overwrite: bool, mode: int = 0o644) -> Non
     """
     refuse_existing(target, overwrite)
     target.parent.mkdir(parents=True, exist_ok=True)
+    for part in target.parent.glob(f".{glob.escape(target.name)}.????????"):
+        with contextlib.suppress(FileNotFoundError):
+            left = time.time() - part.lstat().st_mtime > LEFT_S
+            if left and _PART.fullmatch(part.suffix) and part.is_file() and not part.is_symlink():
+                part.unlink()
     write_atomic(target, content, mode)

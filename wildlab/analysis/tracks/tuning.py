@@ -151,7 +151,8 @@ def _tuned(flight: Flight, sensor: str, reach: float, source: str | None, offset
     groups, m = _groups(scans), scans.detections.shape[-1]
     offset, low, high = now, float("nan"), float("nan")
     if len(offsets) > 1:
-        offset, low, high = _clock(errors_at, offsets, now)
+        at_rest = all(truth.fixed for truth in truths_at(flight, kept[now][0].times))
+        offset, low, high = _clock(errors_at, offsets, now, at_rest)
     errors = errors_at(offset)
     n = sum(int(one.known.sum()) for one in errors)
     if n < FEWEST:
@@ -192,28 +193,30 @@ def _groups(scans: Scans, every: bool = False) -> list[list[int]]:
 
 
 def _clock(
-    errors_at: Callable[[float], list[Errors]], offsets: Array, now: float
+    errors_at: Callable[[float], list[Errors]], offsets: Array, now: float, at_rest: bool
 ) -> tuple[float, float, float]:
     """The offset with least squares, and its 95 % interval.
 
-    It is taken where the interval leaves out the clock as it is, and where to either half of the targets and
-    of the time the best offset of the other half is likelier; else the clock stays, and the interval holds
-    that, too.
+    It is taken where the interval leaves out the clock as it is. Of targets ``at_rest`` a clock shows by how
+    the platform moves alone, and so do the platform's errors: there, the best offset of either half of the
+    targets (of one: of its time) must also be likelier to the other half. Else the clock stays, and the
+    interval holds that, too.
     """
     best, where = now, offsets[::COARSE]
     for _ in range(2):
         errors = errors_at(best)
         scale = _scale([one.error for one in errors])
-        each = _independent(errors)
+        each = _independent(errors, at_rest)
         found = {o: each * _halves(errors_at(o), scale) for o in sorted({*where.tolist(), now})}
-        best = min(found, key=lambda one: found[one][0].sum())
+        best = min(found, key=lambda one: found[one].sum())
         at = int(np.argmin(np.abs(offsets - best)))
         where = offsets[max(at - 4 * COARSE, 0) : at + 4 * COARSE + 1]
-    tried, costs = np.array(list(found)), np.array(list(found.values()))  # (offsets, splits, halves)
-    whole = costs[:, 0].sum(axis=1)
+    tried, costs = np.array(list(found)), np.array(list(found.values()))
+    whole = costs.sum(axis=1)
     near = tried[whole <= whole.min() + DROP]
-    of_other = np.take_along_axis(costs, costs.argmin(axis=0)[None, :, ::-1], axis=0)[0]
-    if whole[tried == now] > whole.min() + DROP and (found[now] > of_other).all():
+    of_other = costs[costs.argmin(axis=0)[::-1], [0, 1]]
+    agreed = not at_rest or (found[now] > of_other).all()
+    if agreed and whole[tried == now] > whole.min() + DROP:
         return best, float(near.min()), float(near.max())
     return now, min(float(near.min()), now), max(float(near.max()), now)
 
@@ -227,43 +230,35 @@ def _scale(errors: Sequence[Array]) -> Array:
     )
 
 
-def _independent(errors: list[Errors]) -> float:
-    """How many independent errors one is worth: of each target's alone, and of all one after the other, for
-    what lasts may be of the platform; the fewer of both."""
-    alone = [one.error[one.known] for one in errors]
-    if not sum(map(len, alone)):
-        return 1.0
-    order = np.argsort(np.concatenate([one.times[one.known] for one in errors]), kind="stable")
-    together = np.concatenate(alone)[order]
-    of_alone = sum(max([1.0, *map(worth, one.T)]) for one in alone if len(one))
-    return float(min(of_alone, max([1.0, *map(worth, together.T)])) / len(together))
+def _independent(errors: list[Errors], together: bool) -> float:
+    """How many independent errors one is worth: each target's by themselves, or all one after the other."""
+    known = [one.error[one.known] for one in errors]
+    if together:
+        order = np.argsort(np.concatenate([one.times[one.known] for one in errors]), kind="stable")
+        known = [np.concatenate(known)[order]]
+    each = [max(map(worth, one.T)) for one in known if len(one)]
+    return float(sum(each) / max(sum(map(len, known)), 1))
 
 
 def _halves(errors: list[Errors], scale: Array) -> Array:
-    """(splits, 2) half the squares of errors in units of their scale, of either half of the targets (where
-    there are several) and of the time.
+    """(2,) half the squares of errors in units of their scale, of either half of the targets, or of the time
+    of one alone.
 
     Gross errors count as ones at `GROSS`. A scan that an offset takes out of the truth's time counts as the
     mean of the others: none gains by it.
     """
-    times = np.concatenate([one.times[one.known] for one in errors])
-    middle, place = np.median(times) if len(times) else 0.0, np.arange(len(errors)) % 2
-    splits = [[place == half for half in (0, 1)]] if len(errors) > 1 else []
+    if len(errors) > 1:
+        halves = errors[::2], errors[1::2]
+    else:
+        middle = int(np.searchsorted(errors[0].times, np.median(errors[0].times)))
+        halves = [errors[0].head(slice(middle))], [errors[0].head(slice(middle, None))]
     found = []
-    for split in (*splits, None):
-        for half in (0, 1):
-            total, known, scans = 0.0, 0, 0
-            for number, one in enumerate(errors):
-                rows = (
-                    (one.times < middle) == (half == 0)
-                    if split is None
-                    else np.full(len(one.times), split[half][number])
-                )
-                there = rows & ~np.isnan(one.error).any(axis=1)
-                squares = np.minimum((one.error[there] / scale) ** 2, GROSS**2).sum()
-                total, known, scans = total + squares / 2, known + there.sum(), scans + rows.sum()
-            found.append(total * scans / known if known else 0.0)
-    return np.array(found).reshape(-1, 2)
+    for half in halves:
+        error = np.concatenate([one.error for one in half])
+        squares = np.minimum((error[~np.isnan(error).any(axis=1)] / scale) ** 2, GROSS**2).sum(axis=1)
+        scans = sum(len(one.times) for one in half)
+        found.append(squares.mean() * scans / 2 if len(squares) else 0.0)
+    return np.array(found)
 
 
 def _errors_of(flight: Flight, scans: Scans, reach: float) -> list[Errors]:
