@@ -13,17 +13,8 @@ from hypothesis.extra.numpy import arrays
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses, Mount
 from wildlab.geometry.frames import euler_to_matrix
-from wildlab.geometry.georeference import (
-    BELOW,
-    HIT,
-    MISSED,
-    NO_DATA,
-    NOT_KNOWN,
-    Terrain,
-    ground_to_pixel,
-    intersect_terrain,
-    pixels_to_terrain,
-)
+from wildlab.geometry.georeference import Terrain, ground_to_pixel, intersect_terrain, pixels_to_terrain
+from wildlab.geometry.rays import BELOW, HIT, MISSED, NO_DATA, NOT_KNOWN
 
 CAMERA = Camera(640, 512, 1000.0, 1000.0, 320.0, 256.0)
 

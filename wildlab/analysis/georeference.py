@@ -25,7 +25,8 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.corrections import Calibration, PosesAt, calibrated_poses
 from wildlab.geometry.covariances import ellipse_axes, inside_ellipse, pose_covariance
 from wildlab.geometry.frames import Array, Indices, Mask, ned_to_geodetic
-from wildlab.geometry.georeference import RAY_STATUS, Terrain, georeference_pixels, pixels_to_terrain
+from wildlab.geometry.georeference import Terrain, georeference_pixels, pixels_to_terrain
+from wildlab.geometry.rays import RAY_STATUS
 from wildlab.geometry.uncertainty import PoseErrors, ground_covariance
 
 #: Standard deviations assumed where neither the log nor the manifest states one; those of the attitude as in

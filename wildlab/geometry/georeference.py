@@ -18,18 +18,7 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera, normalise, project
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
-
-#: What becomes of a ray.
-HIT, MISSED, NO_DATA, BELOW, NOT_KNOWN = 0, 1, 2, 3, 4
-
-#: The same in words.
-RAY_STATUS = {
-    HIT: "met the ground",
-    MISSED: "left the map without meeting the ground",
-    NO_DATA: "came to where the map has no height",
-    BELOW: "started below the ground",
-    NOT_KNOWN: "has no direction or no start",
-}
+from wildlab.geometry.rays import RAY_STATUS
 
 
 def georeference_pixels(poses: CameraPoses, uv: ArrayLike, plane_down: ArrayLike) -> Array:

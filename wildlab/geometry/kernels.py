@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from wildlab.geometry.compilation import compiled
-from wildlab.geometry.georeference import BELOW, HIT, MISSED, NO_DATA, NOT_KNOWN
+from wildlab.geometry.rays import BELOW, HIT, MISSED, NO_DATA, NOT_KNOWN
 
 Array = Any
 

@@ -23,7 +23,8 @@ from wildlab.geometry.camera import Camera, distort, normalise
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.compilation import compiled
 from wildlab.geometry.frames import Array
-from wildlab.geometry.georeference import HIT, MISSED, Terrain, intersect_terrain, pixel_rays
+from wildlab.geometry.georeference import Terrain, intersect_terrain, pixel_rays
+from wildlab.geometry.rays import HIT, MISSED
 
 #: A line of sight ends this share of its length before the point: the point lies on the ground itself.
 SHORT_OF = 1e-7

@@ -40,7 +40,8 @@ from wildlab.flight.schema import DETECTION_KINDS, POSITION
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, Indices, wrap
-from wildlab.geometry.georeference import BELOW, Terrain, georeference_pixels, pixels_to_terrain
+from wildlab.geometry.georeference import Terrain, georeference_pixels, pixels_to_terrain
+from wildlab.geometry.rays import BELOW
 from wildlab.names import listed
 
 #: No lens magnifies one way 2 % more than the other: then the calibration is of something else.
