@@ -18,6 +18,7 @@ from wildlab.flight.checks.sensors import sensors
 from wildlab.flight.clocks import poses_at
 from wildlab.flight.manifest import make_manifest, replace_in_manifest
 from wildlab.flight.store import Flight
+from wildlab.simulation.twins import simulate_twin
 
 
 def detected(
@@ -244,3 +245,10 @@ def test_receivers_that_end_early_are_one_warning_about_the_worst(make_flight):
 def test_truth_of_another_day_is_a_problem_that_names_the_zone(make_flight):
     found = of_truths(flown(make_flight), {"boat": (7200.0, 7300.0)})[0]
     assert found.level == "problem" and "time zone" in found.fix
+
+
+def test_poses_that_are_held_against_themselves_are_named():
+    flight = simulate_twin("large-ship", 1)
+    assert "own-truth" not in {one.code for one in check_flight(flight)}
+    again = replace(flight, nav={**flight.nav, "truth": flight.nav["autopilot"]})
+    assert "own-truth" in {one.code for one in check_flight(again)}

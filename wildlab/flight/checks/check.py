@@ -462,6 +462,18 @@ def duplicates(flight: Flight) -> Iterator[Finding]:
         yield from _in_other_looks(flight, detections)
 
 
+def held_against_itself(flight: Flight) -> Iterator[Finding]:
+    """Poses that are those of the truth, row by row: of these, errors of zero say nothing."""
+    row = ["time_s", *POSITION]
+    for truth in (name for name in flight.nav if name.startswith("truth")):
+        for name in flight.estimated_sources:
+            one, other = (flight.nav[source][row].drop_duplicates(POSITION) for source in (name, truth))
+            n = len(one.merge(other, on=row))
+            if n >= ENOUGH and n > MOST * min(len(one), len(other)):
+                facts = {"n": n, "of": len(one), "truth": truth}
+                yield Finding("warning", f"nav/{name}", "time_s", "own-truth", facts)
+
+
 def _in_one_look(detections: pd.DataFrame, again: Mask) -> Finding:
     rows = detections.loc[again]
     n, of, first = len(rows), len(detections), rows.iloc[0]
@@ -734,6 +746,7 @@ PLAIN: tuple[Question, ...] = (
     identity,
     sensors,
     duplicates,
+    held_against_itself,
     image,
     inertial,
     turning,
