@@ -95,7 +95,7 @@ class Errors(NamedTuple):
         """(N,) where there is an error."""
         return np.asarray(np.isfinite(self.error).all(axis=1) & np.isfinite(self.H).all(axis=(1, 2)))
 
-    def head(self, rows: NDArray[np.bool_] | slice) -> Errors:
+    def only(self, rows: NDArray[np.bool_] | slice) -> Errors:
         """Some of them."""
         return Errors(*(part[rows] for part in self))
 
@@ -163,7 +163,7 @@ def _tuned(flight: Flight, sensor: str, reach: float, source: str | None, offset
             field="detections",
         )
     noise = fit_noise(errors, groups, scans.elements)
-    known = [one.head(one.known) for one in errors]
+    known = [one.only(one.known) for one in errors]
     H = np.concatenate([one.H for one in known])
     lasting = variance_of(H, noise).mean(axis=0)
     total = noise.white**2 + lasting
@@ -251,7 +251,7 @@ def _halves(errors: list[Errors], scale: Array) -> Array:
         halves = errors[::2], errors[1::2]
     else:
         middle = int(np.searchsorted(errors[0].times, np.median(errors[0].times)))
-        halves = [errors[0].head(slice(middle))], [errors[0].head(slice(middle, None))]
+        halves = [errors[0].only(slice(middle))], [errors[0].only(slice(middle, None))]
     found = []
     for half in halves:
         error = np.concatenate([one.error for one in half])
@@ -334,7 +334,7 @@ def fit_noise(errors: Sequence[Errors], groups: Sequence[list[int]], elements: S
     elements
         Names of the m elements of a measurement.
     """
-    some = [one.head(one.known).head(slice(MOST_ERRORS)) for one in errors]
+    some = [one.only(one.known).only(slice(MOST_ERRORS)) for one in errors]
     some = [one for one in some if len(one.times)]
     kinds = list(dict.fromkeys(NOISE_OF[name] for name in elements))
     kind = np.array([kinds.index(NOISE_OF[name]) for name in elements])
