@@ -144,8 +144,11 @@ def errors_by_target(flight: Flight, scored: pd.DataFrame) -> pd.DataFrame:
         known = is_known(points["error_m"], blocks[points.index])
         low, high = (max(error.low, 0.0), error.high) if known else (np.nan, np.nan)
         rows.append([target, kind, sd, len(points), error.estimate, low, high])
-    columns = ["target", "kind", "sd", "n", "mean", "low", "high"]
-    return pd.DataFrame(rows, columns=columns).sort_values(["sd", "kind", "n"], ascending=[True, True, False])
+    table = pd.DataFrame(rows, columns=["target", "kind", "sd", "n", "mean", "low", "high"])
+    # A mark that reports nothing counts as exact, a track as anything.
+    counts = table["sd"].fillna(table["kind"].map({"mark": 0.0, "track": np.inf}))
+    order = table.assign(sd=counts).sort_values(["sd", "kind", "n"], ascending=[True, True, False]).index
+    return table.loc[order]
 
 
 def is_known(values: ArrayLike, blocks: ArrayLike) -> bool:
@@ -541,15 +544,18 @@ def corrected_flight(flight: Flight, source: str | None, learnt: Learnt) -> Flig
     m = flight.manifest
     calibration = _calibration(without_own_clock(m, learnt))
     name, nav = flight.pose_source(source)
-    if m.camera is None or not calibration.names:
+    if m.camera is None:
         return flight
+    noise = {"uncertainty": learnt.noise.model_dump()}
+    if not calibration.names:
+        return replace(flight, manifest=replace_in_manifest(m, noise))
     camera = calibrated_camera(calibration, m.geometry_camera())
     roll, tilt, pan = np.degrees(apply_calibration(calibration, m.geometry_mount()).misalignment)
     changed = replace_in_manifest(
         m,
         {
             "clocks": {"camera_offset_s": m.clocks.camera_offset_s + calibration.value("clock")},
-            "uncertainty": learnt.noise.model_dump(),
+            **noise,
             "camera": {
                 "fx_px": camera.fx,
                 "fy_px": camera.fy,

@@ -251,6 +251,10 @@ def fit_generalised(J: Array, r: Array, covariance: Covariance) -> LinearFit:
     return LinearFit(x, information, float(inner[-1, -1] + gradient @ x))
 
 
+#: A search that is begun again and makes noise likelier by less, in log-likelihood, was at the top.
+LEAST_GAIN = 0.1
+
+
 def estimate_wander(
     points: PosePoints,
     r: ArrayLike,
@@ -294,14 +298,20 @@ def estimate_wander(
     first = np.append(start, 0.0)
     bounds = [(value - 3 * PRIOR, value + 3 * PRIOR) for value in start] + [(-4.0, 4.0)]
     # Differences over less are lost in the rounding of thousands of images, and the search stops half way.
-    found = minimize(
-        negative_log_posterior,
-        first,
-        method="L-BFGS-B",
-        bounds=bounds,
-        options={"maxiter": 200, "ftol": 1e-9, "eps": 1e-5},
-    )
-    return WanderFit(WanderNoise.from_logarithms(found.x), negative_log_posterior)
+    # A search along a line may end short of the top: begun there again, it goes on.
+    before = np.inf
+    while True:
+        found = minimize(
+            negative_log_posterior,
+            first,
+            method="L-BFGS-B",
+            bounds=bounds,
+            options={"maxiter": 200, "ftol": 1e-9, "eps": 1e-5},
+        )
+        first = found.x
+        if before - found.fun < LEAST_GAIN:
+            return WanderFit(WanderNoise.from_logarithms(first), negative_log_posterior)
+        before = found.fun
 
 
 def degrees_of_freedom(

@@ -534,7 +534,7 @@ def looks_of(looks: list[Array]) -> Numbers:
 
 
 #: Per axis, m: a detection's own error, and what both of an image share, on six other flights of the twin
-#: (root mean squares of half their difference and of their mean).
+#: (root mean squares of their difference, divided by the root of two, and of their mean).
 OWN_M, SHARED_M = 2.0, 10.2
 
 

@@ -89,8 +89,7 @@ def assign_jointly(scans: JointScans, x: Array, P: Array, rule: Rule) -> Index:
     Returns
     -------
     (D,)
-        Which target each is most probably of: at its scan where ways are merged, in the likeliest history
-        otherwise.
+        Whose each is in the likeliest way of its scan where ways are merged, else in the likeliest history.
 
     Examples
     --------
