@@ -73,7 +73,11 @@ def test_a_corrected_flight_says_what_the_applied_calibration_says():
     assert len(sense_sentences(late)) == 1
     assert sense_sentences(corrected_flight(late, None, only("clock", 1.0, 0.1, "s"))) == []
     nothing = learnt().model_copy(update={"parameter": (), "covariance": ()})
-    assert corrected_flight(flight, None, nothing) is flight
+    same = corrected_flight(flight, None, nothing)
+    assert same.nav["logged"].equals(flight.nav["logged"]) and same.manifest.mount == flight.manifest.mount
+    # What it says of the noise of poses holds even so, as where it is applied.
+    noise = nothing.noise.model_dump()
+    assert {name: getattr(same.manifest.uncertainty, name) for name in noise} == noise
 
 
 def test_only_another_height_than_that_of_the_calibration_is_said():
