@@ -66,7 +66,9 @@ def test_clock_noise_and_correlation_come_back():
 
 
 def quiet(**changes: float) -> SensorTuning:
-    base = SensorTuning("radar", "position", 0, 0, 0, 2.0, 0.8, 5.0, 1.5, 0.1, 0.01, 100, 50, 0.5, 100)
+    base = SensorTuning(
+        "radar", "position", 0, 0, 0, 2.0, 0.8, 5.0, 1.5, 0.1, 0.01, 100, 50, 0.5, 100, (1.0, 1.0)
+    )
     return base._replace(**changes)
 
 

@@ -15,9 +15,26 @@ from wildlab.studies.autoferry import COMPARED, KEYS, of_use, outcomes, tracks_t
 
 NAMES = load_texts("autoferry").subjects
 
-LIDAR = SensorTuning("lidar", "position", -0.9, -1.1, -0.8, 3.0, 0.9, 20.0, 1.2, 1.5, 0.0, 100, 50, 0.5, 300)
+LIDAR = SensorTuning(
+    "lidar", "position", -0.9, -1.1, -0.8, 3.0, 0.9, 20.0, 1.2, 1.5, 0.0, 100, 50, 0.5, 300, (1.0, 1.0)
+)
 CAMERA = SensorTuning(
-    "eo", "bearing", -1.0, -2.0, 0.5, np.radians(2), 0.8, 5.0, 0.0, 0.0, np.radians(1), 100, 50, 0.2, 9
+    "eo",
+    "bearing",
+    -1.0,
+    -2.0,
+    0.5,
+    np.radians(2),
+    0.8,
+    5.0,
+    0.0,
+    0.0,
+    np.radians(1),
+    100,
+    50,
+    0.2,
+    9,
+    (0.01,),
 )
 
 

@@ -309,7 +309,7 @@ def estimate_wander(
             options={"maxiter": 200, "ftol": 1e-9, "eps": 1e-5},
         )
         first = found.x
-        if before - found.fun < LEAST_GAIN:
+        if not before - found.fun >= LEAST_GAIN:
             return WanderFit(WanderNoise.from_logarithms(first), negative_log_posterior)
         before = found.fun
 

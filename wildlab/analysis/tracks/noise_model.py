@@ -90,12 +90,12 @@ class SensorTuning(NamedTuple):
         Usual time between scans.
     n
         Errors it is from.
+    white_sds
+        Of each element, what is new at every scan.
     own_sds
         Of each element, where they are of several units.
     range_bias_sd_m, tilt_sd_rad
         As ``heading_sd_rad``, for sensors that measure ranges, and for cameras (about each level axis).
-    white_sds
-        Of each element, what is new at every scan; left out: what does not last of ``sds``.
     """
 
     sensor: str
@@ -113,10 +113,10 @@ class SensorTuning(NamedTuple):
     range_sd_m: float
     interval_s: float
     n: int
+    white_sds: tuple[float, ...]
     own_sds: tuple[float, ...] = ()
     range_bias_sd_m: float = 0.0
     tilt_sd_rad: float = 0.0
-    white_sds: tuple[float, ...] = ()
 
     @property
     def clock_tuned(self) -> bool:
@@ -330,7 +330,7 @@ def noise_of_tuning(tuning: SensorTuning) -> NoiseModel:
         tuning.kind,
         tuning.offset_s,
         tuning.sds,
-        np.array(tuning.white_sds or tuning.sds * np.sqrt(1 - tuning.next_correlation)),
+        np.array(tuning.white_sds),
         tuple(lasting),
         tuning.next_correlation,
         tuning.fading,

@@ -34,6 +34,7 @@ from wildlab.analysis.tracks.noise_model import (
 from wildlab.analysis.tracks.scans import (
     SLOTS,
     Scans,
+    Truth,
     errors_near,
     predict_scan,
     scans_of,
@@ -138,22 +139,18 @@ def tune(
 
 def _tuned(flight: Flight, sensor: str, reach: float, source: str | None, offsets: Array) -> SensorTuning:
     """The tuning with the best of some offsets; of one alone its interval is NaN."""
-    kept: dict[float, tuple[Scans, list[Errors]]] = {}
 
     def errors_at(offset: float) -> list[Errors]:
-        if offset not in kept:
-            scans = scans_of(flight, sensor, offset, source)
-            kept[offset] = scans, _errors_of(flight, scans, reach)
-        return kept[offset][1]
+        scans = scans_of(flight, sensor, offset, source)
+        return _errors_of(scans, truths_at(flight, scans.times), reach)
 
-    now = float(offsets[np.argmin(np.abs(offsets))])
-    scans = kept[now][0] if errors_at(now) else scans_of(flight, sensor, now, source)
-    groups, m = _groups(scans), scans.detections.shape[-1]
-    offset, low, high = now, float("nan"), float("nan")
+    offset, low, high = float(offsets[np.argmin(np.abs(offsets))]), float("nan"), float("nan")
     if len(offsets) > 1:
-        at_rest = all(truth.fixed for truth in truths_at(flight, kept[now][0].times))
-        offset, low, high = _clock(errors_at, offsets, now, at_rest)
-    errors = errors_at(offset)
+        at_rest = bool(flight.table("truth")["time_s"].isna().all())
+        offset, low, high = _clock(errors_at, offsets, offset, at_rest)
+    scans = scans_of(flight, sensor, offset, source)
+    truths = truths_at(flight, scans.times)
+    errors, m = _errors_of(scans, truths, reach), scans.detections.shape[-1]
     n = sum(int(one.known.sum()) for one in errors)
     if n < FEWEST:
         raise WildlabError(
@@ -162,16 +159,14 @@ def _tuned(flight: Flight, sensor: str, reach: float, source: str | None, offset
             file=flight.folder,
             field="detections",
         )
-    noise = fit_noise(errors, groups, scans.elements)
-    known = [one.only(one.known) for one in errors]
-    H = np.concatenate([one.H for one in known])
+    noise = fit_noise(errors, _groups(scans), scans.elements)
+    H = np.concatenate([one.H[one.known] for one in errors])
     lasting = variance_of(H, noise).mean(axis=0)
     total = noise.white**2 + lasting
-    near = [truth.position for truth in truths_at(flight, kept[offset][0].times)]
     distance = np.concatenate(
         [
-            np.hypot(*(position - kept[offset][0].platform).T)[one.known]
-            for position, one in zip(near, errors, strict=True)
+            np.hypot(*(truth.position - scans.platform).T)[one.known]
+            for truth, one in zip(truths, errors, strict=True)
         ]
     )
     alike = len({NOISE_OF[name] for name in scans.elements}) == 1
@@ -180,8 +175,8 @@ def _tuned(flight: Flight, sensor: str, reach: float, source: str | None, offset
     return SensorTuning(
         sensor, scans.kind, offset, low, high, float(np.sqrt(total.mean())),
         float((lasting / total).mean()), noise.time_s, position, clock, heading, float(distance.mean()),
-        float(distance.std()), scans.interval_s, n, () if alike and m > 1 else tuple(np.sqrt(total).tolist()),
-        range_bias, tilt, tuple(noise.white.tolist()),
+        float(distance.std()), scans.interval_s, n, tuple(noise.white.tolist()),
+        () if alike and m > 1 else tuple(np.sqrt(total).tolist()), range_bias, tilt,
     )  # fmt: skip
 
 
@@ -261,11 +256,11 @@ def _halves(errors: list[Errors], scale: Array) -> Array:
     return np.array(found)
 
 
-def _errors_of(flight: Flight, scans: Scans, reach: float) -> list[Errors]:
+def _errors_of(scans: Scans, truths: Sequence[Truth], reach: float) -> list[Errors]:
     """Of each target. One without a name that is missed where it should be seen counts as far off, or an
     offset would gain by losing it."""
     found = []
-    for truth in truths_at(flight, scans.times):
+    for truth in truths:
         error = errors_near(scans, truth, reach)[0]
         if not scans.labelled:
             missed = np.isnan(error) & np.isfinite(truth.position[:, :1])
@@ -467,6 +462,7 @@ def tune_by_innovations(
         tunings[name] = SensorTuning(
             name, scans.kind, noise.offset_s, np.nan, np.nan, float(sds[0]), 0.0, max(interval, 1e-3),
             0.0, 0.0, 0.0, noise.range_m, noise.range_sd_m, interval, n, tuple(sds.tolist()),
+            tuple(sds.tolist()),
         )  # fmt: skip
     return tunings, float(targets.density * factors[0])
 
