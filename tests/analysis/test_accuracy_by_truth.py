@@ -62,3 +62,10 @@ def test_an_interval_needs_independent_errors(lasts, known):
     if known:
         assert row["low"] < row["mean"] < row["high"]
     assert len(np.unique(blocks_of(flight, scored))) >= 5
+
+
+def test_targets_stand_in_the_order_that_the_headline_takes():
+    """A mark that states nothing is exact, a track that states nothing comes last."""
+    for mark_sd, walker_sd in ((np.nan, 3.0), (0.02, np.nan), (0.02, 3.0)):
+        flight = walked(mark_sd, walker_sd)
+        assert errors_by_target(flight, score(flight))["target"].iloc[-1] == "walker"

@@ -20,7 +20,15 @@ from wildlab.analysis.tracks.noise_model import (
 )
 from wildlab.analysis.tracks.scans import predict_scan, scans_of
 from wildlab.analysis.tracks.tracker import track
-from wildlab.analysis.tracks.tuning import Errors, Noise, log_likelihood, tune_flight
+from wildlab.analysis.tracks.tuning import (
+    OFFSETS_S,
+    Errors,
+    Noise,
+    _clock,
+    fit_noise,
+    log_likelihood,
+    tune_flight,
+)
 from wildlab.flight.manifest import parse_settings
 from wildlab.geometry.covariances import pose_covariance
 from wildlab.geometry.frames import euler_to_matrix
@@ -113,6 +121,49 @@ def test_errors_are_as_likely_as_one_large_gaussian_has_it():
     assert log_likelihood([Errors(times, e.reshape(12, 2), H)], noise) == pytest.approx(dense)
 
 
+def test_white_errors_are_put_down_to_nothing_that_lasts():
+    """Two groups of errors of 1000 draws each; by chance one of twenty gains so much, twice."""
+    without = 0
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        H = rng.normal(size=(500, 2, 2)) + 1.0
+        errors = [Errors(np.arange(500.0), rng.normal(0, 0.7, (500, 2)), H)]
+        found = fit_noise(errors, [[0], [1]], ("north", "east"))
+        np.testing.assert_allclose(found.white, 0.7, rtol=0.1)
+        without += not found.lasting.any()
+    assert without >= 7
+
+
+def clock_of(best: tuple[float, float], slope: float, at_rest: bool, gone_from: float = np.inf):
+    """By errors (300,) of two targets that grow with the distance from each one's own best offset, s; of the
+    second half of time the truth is not known from an offset on."""
+    rng, t = np.random.default_rng(4), np.arange(300.0)
+    noise = rng.normal(0, 1.0, (2, 300, 1))
+
+    def errors_at(offset: float) -> list[Errors]:
+        found = [one + slope * (offset - own) for own, one in zip(best, noise, strict=True)]
+        for one in found:
+            one[(t > 150) & (offset >= gone_from)] = np.nan
+        return [Errors(t, one, np.zeros((300, 1, 0))) for one in found]
+
+    return _clock(errors_at, OFFSETS_S, 0.0, at_rest)
+
+
+def test_a_clock_is_taken_where_it_is_told_and_halves_of_marks_agree():
+    assert clock_of((1.0, 1.0), 1.0, False)[0] == pytest.approx(1.0, abs=0.15)
+    assert clock_of((1.0, 1.0), 1.0, True)[0] == pytest.approx(1.0, abs=0.15)
+    # Of two marks one says a second and the other none.
+    offset, low, high = clock_of((1.5, -0.1), 1.0, False)
+    assert offset == pytest.approx(0.7, abs=0.2) and low > 0
+    offset, low, high = clock_of((1.5, -0.1), 1.0, True)
+    assert offset == 0.0 and low <= 0.0 <= high
+    # Nothing tells it, and losing the truth of half of the time is no gain.
+    for gone_from in (np.inf, 1.0):
+        offset, low, high = clock_of((1.0, 1.0), 0.01, False, gone_from)
+        assert offset == 0.0 and low <= 0.0 <= high
+
+
+@pytest.mark.slow
 def test_a_heading_that_is_off_teaches_no_clock_and_a_few_gross_errors_teach_nothing():
     (tuned,) = tune_flight(robot_flight(9, heading_off_deg=2.0), ["radar"]).sensors.values()
     assert abs(tuned.offset_s) < 0.3 and tuned.clock_sd_s < 0.3
