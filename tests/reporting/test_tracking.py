@@ -121,7 +121,7 @@ def test_every_track_is_in_the_denominator():
     both = pd.concat([rows(), rows(target="u", nees=50.0, verdict="overconfident"), lost, other])
     first = page.answer(both, [])[0]
     assert first.key == "errors-mixed" and (first.values["n"], first.values["judged"]) == (4, 3)
-    assert page.reason(both).values["counts"] == "1 consistent, 2 overconfident, 1 not judged"
+    assert page.reason(both).values["counts"] == "consistent (1), overconfident (2), not judged (1)"
 
 
 def test_every_filter_that_the_numbers_are_of_is_named():

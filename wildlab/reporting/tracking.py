@@ -285,7 +285,7 @@ def reason(rows: pd.DataFrame, problems: int = 0) -> Message:
     what = "nees" if column == "verdict" else "nis"
     few = bool(mine.apply(on_few, axis=1, what=what).any())
     counts = ", ".join(
-        f"{count} {word}"
+        f"{word} ({count})"
         for word in (CONSISTENT, OVERCONFIDENT, CAUTIOUS, UNKNOWN)
         if (count := int((mine[column] == word).sum()))
     )
