@@ -1,8 +1,8 @@
 """What one flight teaches about sensors and targets, for another one to be judged by.
 
 Against truth: how late a sensor's clock is, how large its errors are, how long they last and what of. Noise
-and errors that last are found together, by how likely they make the errors of each target (`Noise`); an error
-beyond `GROSS` standard deviations of what is expected of it counts as one there and teaches nothing else.
+and errors that last are found together, by products of errors of each target (`fit_noise`); an error beyond
+`GROSS` times what errors usually are teaches nothing.
 Where no detection says what it is of, the one nearest to a target, within reach, is taken for its own.
 
 Without truth: noise and liveliness under which a flight's own innovations are likeliest.
@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy.optimize import minimize
+from scipy.optimize import minimize, nnls
 
 from wildlab.analysis.tracks.noise_model import (
     GROUPS,
@@ -46,7 +46,6 @@ from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import worth
 from wildlab.flight.manifest import Settings
 from wildlab.flight.store import Flight
-from wildlab.geometry.compilation import compiled
 from wildlab.geometry.frames import Array
 from wildlab.tracking.run import Start, run_filter
 from wildlab.tracking.sensors import Merged, head
@@ -57,8 +56,11 @@ OFFSETS_S, COARSE = np.arange(-5.0, 2.001, 0.05), 5
 GROSS = 5.0
 #: Errors that parameters are fitted to, at most, of each target.
 MOST_ERRORS = 2000
-#: Errors may last so long at most, s.
-LONGEST_S = 1e4
+#: Lags of two errors, and for how long errors may last, s: none, and each so many times the one before.
+LAG_STEP = 1.2
+LAGS_S = np.array([0.0, *0.05 * LAG_STEP ** np.arange(68)])
+#: White noise is no smaller than this, beside what errors usually are: a filter has to bear it.
+LEAST_WHITE = 0.1
 #: Fewest errors from which anything is estimated.
 FEWEST = 20
 #: Half of chi-square's 95 % point with one degree of freedom: how far a log-likelihood may lie below its top.
@@ -269,56 +271,15 @@ def _errors_of(scans: Scans, truths: Sequence[Truth], reach: float) -> list[Erro
     return found
 
 
-def log_likelihood(errors: Sequence[Errors], noise: Noise) -> float:
-    """Of errors of targets, each alone; of gross ones as if they were `GROSS` standard deviations off."""
-    used = noise.lasting > 0
-    return float(
-        sum(
-            _of_errors(t, error, H[..., used], noise.white, noise.lasting[used], noise.time_s)
-            for t, error, H in errors
-        )
-    )
-
-
-@compiled
-def _of_errors(times: Array, error: Array, H: Array, white: Array, lasting: Array, time_s: float) -> float:
-    """By a Kalman filter on the errors that last, element after element."""
-    k = len(lasting)
-    b, P, across, total, last = np.zeros(k), np.diag(lasting**2), np.zeros(k), 0.0, -np.inf
-    for row in range(len(times)):
-        if not (error[row] == error[row]).all() or not (H[row] == H[row]).all():
-            continue
-        fade = np.exp(-(times[row] - last) / time_s)
-        last = times[row]
-        for i in range(k):
-            b[i] *= fade
-            for j in range(k):
-                P[i, j] *= fade**2
-            P[i, i] += (1 - fade**2) * lasting[i] ** 2
-        for element in range(len(white)):
-            S, off = white[element] ** 2, error[row, element]
-            for i in range(k):
-                across[i] = 0.0
-                for j in range(k):
-                    across[i] += P[i, j] * H[row, element, j]
-                S += H[row, element, i] * across[i]
-                off -= H[row, element, i] * b[i]
-            total -= np.log(S) / 2
-            if off**2 >= GROSS**2 * S:
-                total -= GROSS**2 / 2
-                continue
-            total -= off**2 / S / 2
-            for i in range(k):
-                b[i] += across[i] * off / S
-                for j in range(k):
-                    P[i, j] -= across[i] * across[j] / S
-    return total
-
-
 def fit_noise(errors: Sequence[Errors], groups: Sequence[list[int]], elements: Sequence[str]) -> Noise:
-    """The likeliest noise, one standard deviation for each of the groups of errors that last and for elements
-    of a kind. Groups are taken in one by one, the one that explains most first, while errors become likelier
-    than chance makes them.
+    """The noise that products of errors fit best, one standard deviation for each of the groups of errors
+    that last and for elements of a kind.
+
+    Of two errors of a target, the mean of the product is ``H lasting**2 H' exp(-lag / time_s)``, and the
+    white variance more where both are one and the same. For a given time that is linear in the variances,
+    none of which is negative. Lags count alike on a logarithmic scale, so that what lasts for a second and
+    what lasts throughout are both seen. How errors are distributed plays no part, as it does not for a linear
+    filter.
 
     Parameters
     ----------
@@ -329,58 +290,52 @@ def fit_noise(errors: Sequence[Errors], groups: Sequence[list[int]], elements: S
     elements
         Names of the m elements of a measurement.
     """
-    some = [one.only(one.known).only(slice(MOST_ERRORS)) for one in errors]
-    some = [one for one in some if len(one.times)]
     kinds = list(dict.fromkeys(NOISE_OF[name] for name in elements))
     kind = np.array([kinds.index(NOISE_OF[name]) for name in elements])
-    if not some:
-        return Noise(np.ones(len(elements)), np.zeros(errors[0].H.shape[-1]), LONGEST_S)
-    H = np.concatenate([one.H for one in some])
-    size = np.abs(np.concatenate([one.error for one in some]))
-    scale = np.array([np.median(size[:, kind == number]) for number in range(len(kinds))]) / MEDIAN_OF_NORMAL
-    scale = np.maximum(scale, 1e-9)
+    spreads = _scale([one.error for one in errors])
+    scale = np.array([np.sqrt(np.mean(spreads[kind == number] ** 2)) for number in range(len(kinds))])[kind]
+    m, size = len(elements), len(kinds) + len(groups)
+    gram, product = np.zeros((len(LAGS_S), size, size)), np.zeros((len(LAGS_S), size))
+    white = np.diag(1 / scale**2) @ np.eye(len(kinds))[kind]
+    gaps = []
+    for one in errors:
+        good = one.known & (np.abs(one.error) < GROSS * scale).all(axis=1)
+        t, error, H = one.only(good).only(slice(MOST_ERRORS))
+        e, H, apart = error / scale, H / scale[:, None], 0
+        gaps.append(np.diff(t))
+        while apart < len(t):
+            i, j = slice(0, len(t) - apart), slice(apart, None)
+            pairs = np.zeros((len(t) - apart, m, m, size))
+            for column, group in enumerate(groups, start=len(kinds)):
+                pairs[..., column] = H[i][..., group] @ np.swapaxes(H[j][..., group], 1, 2)
+            if not apart:
+                pairs[:, range(m), range(m), : len(kinds)] = white
+            # The nearest lag, the first of which is none.
+            place = np.searchsorted(LAGS_S[1:] * LAG_STEP**-0.5, t[j] - t[i], side="right")
+            np.add.at(gram, place, np.einsum("nabc,nabd->ncd", pairs, pairs))
+            np.add.at(product, place, np.einsum("nabc,na,nb->nc", pairs, e[i], e[j]))
+            apart = max(apart + 1, apart * 3 // 2)
+    # What lasts no longer than from one error to the next is white.
+    shortest = 2 * float(np.median(np.concatenate(gaps))) if sum(map(len, gaps)) else 0.0
+    tries = [(*_variances(gram, product, time_s), float(time_s)) for time_s in LAGS_S[shortest < LAGS_S]]
+    _, variances, time_s = min(tries, key=lambda one: one[0])
+    lasting = np.zeros(errors[0].H.shape[-1])
+    for group, variance in zip(groups, variances[len(kinds) :], strict=True):
+        lasting[group] = np.sqrt(variance)
+    return Noise(np.maximum(np.sqrt(variances[: len(kinds)])[kind], LEAST_WHITE * scale), lasting, time_s)
 
-    def fitted(white: Array, used: list[list[int]], lasting: Array, time_s: float) -> tuple[float, Noise]:
-        first = np.log([*white, *lasting, time_s])
 
-        def noise_of(logs: Array) -> Noise:
-            values = np.exp(np.clip(logs, first - 7, first + 7))
-            every = np.zeros(H.shape[-1])
-            for group, sd in zip(used, values[len(kinds) : -1], strict=True):
-                every[group] = sd
-            return Noise(values[: len(kinds)][kind], every, float(min(values[-1], LONGEST_S)))
-
-        def cost(logs: Array) -> float:
-            return -log_likelihood(some, noise_of(logs))
-
-        best = minimize(cost, first, method="L-BFGS-B", options={"maxiter": 40, "eps": 1e-4})
-        return -float(best.fun), noise_of(np.asarray(best.x))
-
-    worth, found = fitted(scale, [], np.zeros(0), 20.0)
-    used: list[list[int]] = []
-    while rest := [group for group in groups if group not in used]:
-        tries = []
-        for group in rest:
-            unit = np.sqrt(np.mean(((np.abs(H[..., group]).sum(axis=-1)) / scale[kind]) ** 2))
-            if unit > 0:
-                sds = [*(found.lasting[one[0]] for one in used), 0.5 / unit]
-                white = np.array([found.white[kind == number][0] for number in range(len(kinds))])
-                tries.append((*fitted(white, [*used, group], np.array(sds), found.time_s), group))
-        best = max(tries, key=lambda one: one[0], default=None)
-        if best is None or best[0] - worth < DROP:
-            break
-        worth, found = best[:2]
-        used.append(best[2])
-    # How fast errors change tells little of the size of those that outlast the flight: they are no larger
-    # than what was seen.
-    lasting = variance_of(H, found)
-    total = lasting + found.white**2
-    gross = size**2 > GROSS**2 * total
-    seen = np.nanmean(np.where(gross, np.nan, size**2), axis=0)
-    room = np.maximum(seen - found.white**2, 0) / seen
-    needed = np.mean(lasting, axis=0) / seen
-    share = min(1.0, float(room.sum() / needed.sum())) if needed.any() else 1.0
-    return found._replace(lasting=np.sqrt(share) * found.lasting)
+def _variances(gram: Array, product: Array, time_s: float) -> tuple[float, Array]:
+    """What is left of the squares of products by lag, up to a constant, and the variances that leave least,
+    where errors last so long."""
+    fades = np.exp(-LAGS_S / time_s)
+    G, b = np.einsum("l,lcd->cd", fades**2, gram), fades @ product
+    unit = np.sqrt(np.diag(G))
+    unit[unit == 0] = 1.0
+    G, b = G / unit[:, None] / unit, b / unit
+    root = np.linalg.cholesky(G + 1e-9 * np.eye(len(b)))
+    found, _ = nnls(root.T, np.linalg.solve(root, b))
+    return float(found @ G @ found - 2 * b @ found), found / unit
 
 
 def variance_of(H: Array, noise: Noise) -> Array:
