@@ -76,9 +76,7 @@ def test_all_targets_at_once_without_a_name(tmp_path):
     assert (pd.read_parquet(tmp_path / "out" / "estimates.parquet")["track"] >= 0).all()
 
 
-@pytest.mark.parametrize(
-    "option", [("--tune", "other"), ("--filter", "ekf"), ("--target", "boat"), ("--smooth",)]
-)
+@pytest.mark.parametrize("option", [("--filter", "ekf"), ("--target", "boat"), ("--smooth",)])
 def test_options_that_do_not_go_with_many(tmp_path, option):
     flight = kept(tmp_path, kind="position")
     (tmp_path / "other").mkdir()

@@ -25,7 +25,7 @@ from wildlab.analysis.tracks.tuning import (
     Noise,
     _clock,
     fit_noise,
-    tune_flight,
+    tune_flights,
     variance_of,
 )
 from wildlab.flight.manifest import parse_settings
@@ -201,23 +201,23 @@ def test_a_clock_is_taken_where_it_is_told_and_halves_of_marks_agree():
 
 @pytest.mark.slow
 def test_a_heading_that_is_off_teaches_no_clock_and_a_few_gross_errors_teach_nothing():
-    (tuned,) = tune_flight(robot_flight(9, heading_off_deg=2.0), ["radar"]).sensors.values()
+    (tuned,) = tune_flights([robot_flight(9, heading_off_deg=2.0)], ["radar"]).sensors.values()
     assert abs(tuned.offset_s) < 0.3 and tuned.clock_sd_s < 0.3
     assert 1.0 < np.degrees(tuned.heading_sd_rad) < 3.0
     sound, gross = (robot_flight(9, seconds=400.0) for _ in range(2))
     gross.tables["detections"].loc[[100, 300, 500, 700], "azimuth_rad"] += 2.0
-    before, after = (tune_flight(one, ["radar"]).sensors["radar"] for one in (sound, gross))
+    before, after = (tune_flights([one], ["radar"]).sensors["radar"] for one in (sound, gross))
     assert np.degrees(after.heading_sd_rad) < 0.1
     np.testing.assert_allclose(after.own_sds, before.own_sds, rtol=0.02)
 
 
 def test_what_is_stated_takes_the_place_of_what_was_tuned_of_it_alone():
-    tuned = tune_flight(robot_flight(8, heading_off_deg=2.0), ["radar"]).sensors["radar"]
+    tuned = tune_flights([robot_flight(8, heading_off_deg=2.0)], ["radar"]).sensors["radar"]
     tuned = tuned._replace(heading_sd_rad=0.03, range_bias_sd_m=0.4)
     flight = robot_flight(9)
     stated = parse_settings("[sensors.radar.considered.heading]\nsd_deg = 1.0\n")
     scans = scans_of(flight, "radar")
-    model, given = model_noise(flight, scans, settings_of(flight, stated), tuned, "first")
+    model, given = model_noise(flight, scans, settings_of(flight, stated), tuned, "tuned on first")
     sds = {one.name: one.sd for one in model.considered}
     assert sds["heading"] == np.radians(1.0) and sds["range_bias"] == 0.4
     sources = {one.what: one.source for one in given}
@@ -227,7 +227,7 @@ def test_what_is_stated_takes_the_place_of_what_was_tuned_of_it_alone():
 
 @pytest.mark.slow
 def test_truth_tells_a_heading_and_the_other_flight_is_judged_by_it():
-    found = tune_flight(robot_flight(8, name="first", heading_off_deg=2.0), ["radar"])
+    found = tune_flights([robot_flight(8, name="first", heading_off_deg=2.0)], ["radar"])
     assert found.against == "truth" and found.flight == "first"
     assert np.degrees(found.sensors["radar"].heading_sd_rad) == pytest.approx(2.0, rel=0.4)
     followed = track(robot_flight(9, heading_off_deg=-2.0), tuned=found)

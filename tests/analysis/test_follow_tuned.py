@@ -11,8 +11,10 @@ from tests.analysis.conftest import changed
 from tests.analysis.robots import boat, paused, robot_flight, rows_of, seen_only
 from tests.refused import refused
 from wildlab.analysis.tracks import tracker
+from wildlab.analysis.tracks.many import track_jointly
 from wildlab.analysis.tracks.tracker import _between
-from wildlab.analysis.tracks.tuning import read_tuned, refuse_same, tune_flight, tuned_text
+from wildlab.analysis.tracks.tuning import read_tuned, refuse_same, tune_flights, tuned_text
+from wildlab.evaluation.consistency import nees
 from wildlab.flight.manifest import parse_settings
 from wildlab.tracking.motion import white_acceleration
 
@@ -34,9 +36,8 @@ def by_filterpy(z, t, density, sd, x, P):
 @pytest.mark.slow
 def test_tracks_smoothers_and_their_numbers_are_those_of_another_program():
     """Tuned on one flight, judged on another: filterpy's filter and smoother, and sums written out."""
-    tuned = tune_flight(
-        robot_flight(1, kind="position", position_sd=1.0, seconds=60.0), ["radar"], None, "innovations"
-    )
+    flight = robot_flight(1, kind="position", position_sd=1.0, seconds=60.0)
+    tuned = tune_flights([flight], ["radar"], None, "innovations")
     flight = robot_flight(2, kind="position", position_sd=1.0, name="judged")
     followed = tracker.track(flight, tuned=tuned, smooth=True, filters=["ekf"])
     track, back = followed.tracks
@@ -63,7 +64,7 @@ def test_tracks_smoothers_and_their_numbers_are_those_of_another_program():
 
 def test_innovations_are_likeliest_at_what_was_tuned():
     flight = robot_flight(1, kind="position", position_sd=1.0, seconds=60.0)
-    tuned = tune_flight(flight, ["radar"], None, "innovations")
+    tuned = tune_flights([flight], ["radar"], None, "innovations")
     scans = tracker.track(flight, tuned=tuned).scans["radar"]
     z, t = scans.detections[:, 0], scans.times
 
@@ -93,8 +94,8 @@ def test_part_of_the_flight_that_is_judged_teaches_nothing():
 @pytest.mark.slow
 def test_a_clock_that_nothing_tells_of_is_not_said_to_be_tuned():
     flight, other = robot_flight(1, seconds=60.0), robot_flight(2, name="other", seconds=60.0)
-    by_truth = tune_flight(flight, ["radar"])
-    by_innovations = tune_flight(flight, ["radar"], None, "innovations")
+    by_truth = tune_flights([flight], ["radar"])
+    by_innovations = tune_flights([flight], ["radar"], None, "innovations")
     assert by_truth.sensors["radar"].clock_tuned
     for tuned, said in ((by_truth, True), (by_innovations, False)):
         told = tracker.track(other, tuned=read_tuned(tuned_text(tuned))).given
@@ -120,3 +121,39 @@ def test_a_track_carried_to_the_looks_of_another_sensor_is_the_less_certain():
         P = _between(track, track.times[20:21] + dt, 0.7)[1][0]
         F, Q = white_acceleration(dt, 0.7)
         np.testing.assert_allclose(P, (F @ track.covariance[20] @ F.T + Q)[:2, :2], rtol=1e-9)
+
+
+def test_several_flights_teach_together_and_one_more_does_not_move_what_is_alike():
+    """Twice the same one teaches the same; of two clocks there is one between them."""
+    one, other = (robot_flight(seed, kind="position", seconds=200.0, correlation=0.9) for seed in (1, 2))
+    alone, doubled, both = (
+        tune_flights(flights, ["radar"]).sensors["radar"] for flights in ([one], [one, one], [one, other])
+    )
+    assert doubled.n == 2 * alone.n and doubled.sd == pytest.approx(alone.sd, rel=1e-9)
+    assert doubled.correlation_time_s == alone.correlation_time_s
+    each = [tune_flights([flight], ["radar"]).sensors["radar"] for flight in (one, other)]
+    assert min(x.sd for x in each) <= both.sd <= max(x.sd for x in each)
+    late = [robot_flight(seed, seconds=200.0, late_s=s) for seed, s in ((1, 0.4), (2, 1.2))]
+    assert -1.2 < tune_flights(late, ["radar"]).sensors["radar"].offset_s < -0.4
+
+
+def test_what_lasts_is_tuned_for_many_targets_too():
+    """Errors that last taken for white make tracks of many targets too sure of themselves."""
+    teachers = [robot_flight(seed, kind="position", seconds=400.0, correlation=0.9) for seed in (1, 2)]
+    tuned = tune_flights(teachers, ["radar"])
+    squares = {}
+    for told in (None, tuned):
+        off = []
+        for seed in range(3, 9):
+            flight = robot_flight(seed, kind="position", seconds=200.0, correlation=0.9, labelled=False)
+            found = track_jointly(flight, tuned=told)
+            way = found.truth["boat"]
+            for row, shown in enumerate(found.shown):
+                if len(shown.x):
+                    off.append(nees(shown.x[:1, :2] - way[row], shown.P[:1, :2, :2])[0])
+        squares[told is None] = float(np.mean(off))
+    (sensor,) = found.sensors
+    one = tuned.sensors["radar"]
+    assert (sensor.correlation, sensor.lasting_s) == (one.next_correlation, one.correlation_time_s)
+    assert not found.unknown_correlation
+    assert 1.5 < squares[False] < 2.7 and squares[True] > 10.0

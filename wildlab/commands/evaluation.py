@@ -138,7 +138,12 @@ def georeference(flight: Path, out: Path, overwrite: bool, source: str | None, s
 
 @click.command()
 @click.argument("flight", type=FOLDER)
-@click.option("--tune", type=FOLDER, help="Another flight, that teaches the sensors' errors.")
+@click.option(
+    "--tune",
+    type=FOLDER,
+    multiple=True,
+    help="Another flight, that teaches the sensors' errors; several are allowed.",
+)
 @click.option("--against", type=click.Choice(["truth", "innovations"]), help="What --tune learns from.")
 @click.option("--filter", "filters", multiple=True, help="A filter; several are allowed.")
 @click.option("--target", "targets", multiple=True, help="A target; all if not given.")
@@ -151,7 +156,7 @@ def georeference(flight: Path, out: Path, overwrite: bool, source: str | None, s
 @shared.overwrite
 def track(
     flight: Path,
-    tune: Path | None,
+    tune: tuple[Path, ...],
     against: str | None,
     filters: tuple[str, ...],
     targets: tuple[str, ...],
@@ -180,7 +185,7 @@ def track(
       wildlab track flights/tuesday
       wildlab track flights/wednesday --tune flights/tuesday --filter schmidt --filter coloured
       wildlab track flights/harbour --settings settings.toml --target boat --sensor radar
-      wildlab track flights/harbour --many --settings settings.toml
+      wildlab track flights/harbour --many --tune flights/monday --tune flights/tuesday
     """
     if out is not None:
         refuse_existing(out / "report.html", overwrite)
@@ -190,11 +195,11 @@ def track(
     console = terminal_console()
     outcome: Outcome
     if many:
-        refuse_unfit({"--tune": tune, "--against": against, "--filter": filters, "--target": targets,
-                      "--smooth": smooth})  # fmt: skip
+        refuse_unfit({"--filter": filters, "--target": targets, "--smooth": smooth})
         outcome = track_many(
-            flight, sensors=sensors, settings=settings, source=source, into=out, console=console
-        )
+            flight, tune=tune, against=against, sensors=sensors, settings=settings, source=source, into=out,
+            console=console,
+        )  # fmt: skip
     else:
         outcome = track_flight(
             flight, tune=tune, against=against, filters=filters, targets=targets, sensors=sensors,

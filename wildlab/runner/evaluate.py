@@ -19,7 +19,7 @@ from wildlab.analysis.tracks.many import refuse_unfit as refuse_unfit_settings
 from wildlab.analysis.tracks.noise_model import Against, settings_of
 from wildlab.analysis.tracks.scans import sensors_of
 from wildlab.analysis.tracks.tracker import refuse_unusable, sensors_with_detections
-from wildlab.analysis.tracks.tuning import refuse_same, tune_flight, tuned_text
+from wildlab.analysis.tracks.tuning import refuse_same, tune_flights, tuned_text
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic, write_csv
 from wildlab.flight.calibration_files import calibration_toml, read_learnt, refuse_other_camera
@@ -304,7 +304,7 @@ def refuse_unfit(options: Mapping[str, object]) -> None:
 def track_flight(
     folder: Path,
     *,
-    tune: Path | None = None,
+    tune: Sequence[Path] = (),
     against: str | None = None,
     filters: Sequence[str] = (),
     targets: Sequence[str] = (),
@@ -319,7 +319,7 @@ def track_flight(
     Parameters
     ----------
     tune
-        Another flight folder, on which sensors are tuned.
+        Other flights' folders, on which sensors are tuned.
     against
         ``"truth"`` or ``"innovations"``: how it is tuned; truth where there is any, if left out.
     filters, targets, sensors, source
@@ -340,28 +340,8 @@ def track_flight(
     """
     flight = load_flight(folder)
     stated = None if settings is None else read_settings(settings)
-    if against is not None and tune is None:
-        raise WildlabError(
-            "it is not said on which flight to tune",
-            "add --tune, or leave --against out",
-            field="--against",
-        )
     refuse_unusable(flight, stated, filters, targets, sensors, source)
-    tuned = ""
-    if tune is not None:
-        other = load_flight(tune)
-        refuse_same(flight, other)
-        wanted = sensors_with_detections(flight, sensors)
-        there = set(sensors_with_detections(other))
-        if missing := [name for name in wanted if name not in there]:
-            raise WildlabError(
-                f"the flight {other.name!r} has no detections of the sensor {missing[0]!r}",
-                "name the sensors of both with --sensor",
-                file=tune,
-                field="--tune",
-            )
-        its_source = source if source in other.nav else None
-        tuned = tuned_text(tune_flight(other, wanted, stated, cast(Against | None, against), its_source))
+    tuned = _tuned_text(flight, tune, against, stated, sensors, source)
     parameters: dict[str, Any] = {
         "settings": _text_of(stated),
         "tuned": tuned,
@@ -386,9 +366,42 @@ def track_flight(
     return _run_report(flight, study, "tracking", options, **places)
 
 
+def _tuned_text(
+    flight: Flight,
+    tune: Sequence[Path],
+    against: str | None,
+    stated: Settings | None,
+    sensors: Sequence[str],
+    source: str | None,
+) -> str:
+    """What other flights teach, as a notebook takes it; empty where there are none."""
+    if against is not None and not tune:
+        raise WildlabError(
+            "it is not said on which flight to tune",
+            "add --tune, or leave --against out",
+            field="--against",
+        )
+    if not tune:
+        return ""
+    wanted, others = sensors_with_detections(flight, sensors), [load_flight(one) for one in tune]
+    for other in others:
+        refuse_same(flight, other)
+        there = set(sensors_with_detections(other))
+        if missing := [name for name in wanted if name not in there]:
+            raise WildlabError(
+                f"the flight {other.name!r} has no detections of the sensor {missing[0]!r}",
+                "name the sensors that all have with --sensor",
+                file=other.folder,
+                field="--tune",
+            )
+    return tuned_text(tune_flights(others, wanted, stated, cast(Against | None, against), source))
+
+
 def track_many(
     folder: Path,
     *,
+    tune: Sequence[Path] = (),
+    against: str | None = None,
     sensors: Sequence[str] = (),
     settings: Path | None = None,
     source: str | None = None,
@@ -399,6 +412,8 @@ def track_many(
 
     Parameters
     ----------
+    tune, against
+        As of `track_flight`.
     sensors, source
         As `wildlab.analysis.tracks.tracker.track`.
     settings
@@ -420,10 +435,22 @@ def track_many(
     if unknown and console is not None:
         text = f"note: the settings speak of {unknown}, which this flight does not have."
         console.print(text, markup=False, highlight=False)
-    parameters = {"settings": _text_of(stated), "sensors": list(sensors), "source": source or ""}
+    parameters = {
+        "settings": _text_of(stated),
+        "tuned": _tuned_text(flight, tune, against, stated, sensors, source),
+        "sensors": list(sensors),
+        "source": source or "",
+    }
     title = f"All targets of {flight.name}"
     study = StudyEntry(name="evaluate", title=title, notebook=MANY_NOTEBOOK, parameters=parameters)
-    options = {"many": True, "sensor": sensors, "settings": settings, "source": source}
+    options = {
+        "many": True,
+        "tune": tune,
+        "against": against,
+        "sensor": sensors,
+        "settings": settings,
+        "source": source,
+    }
     return _run_report(flight, study, "many", options, console=console, **places)
 
 

@@ -303,7 +303,7 @@ def case_of(flight: Flight) -> str:
 
 def tune_sensor(flight: Flight, sensor: str) -> SensorTuning:
     """Everything of a sensor from one scenario, see `wildlab.analysis.tracks.tuning.tune`."""
-    return tune(flight, sensor, BOATS.reach)
+    return tune([flight], sensor, BOATS.reach)
 
 
 def tune_sensors(flight: Flight) -> dict[str, SensorTuning]:

@@ -26,7 +26,6 @@ from wildlab.analysis.georeference import (
 from wildlab.analysis.tracks.noise_model import (
     ASSUMED,
     OF_PLATFORM,
-    STATED,
     GivenValue,
     GivenValues,
     NoiseModel,
@@ -128,8 +127,8 @@ def roots_of_deviations(R_nb: Array, sd: Array) -> Array:
     return roots
 
 
-def given_of_pixels(flight: Flight, scans: Scans, part: SensorPart) -> list[GivenValue]:
-    """What is assumed of the errors that all pixels of an image share, and who says so."""
+def given_of_pixels(flight: Flight, scans: Scans, part: SensorPart, says: str) -> list[GivenValue]:
+    """What is assumed of errors that all pixels of an image share; ``says``: who tells how long they last."""
     given, stated = GivenValues(scans.sensor), flight.manifest.uncertainty
     taken = {OF_PLATFORM.get(each) for name in part.considered for each in errors_named(name)}
     own = scans.poses is not None and scans.poses.covariance is not None
@@ -144,7 +143,7 @@ def given_of_pixels(flight: Flight, scans: Scans, part: SensorPart) -> list[Give
     words = (
         "another at each scan" if lasts == 0 else "the whole flight" if np.isinf(lasts) else f"{lasts:.3g} s"
     )
-    given.add("how long errors of the pose last", words, ASSUMED if lasts == 0 else STATED)
+    given.add("how long errors of the pose last", words, ASSUMED if lasts == 0 else says)
     return given.values
 
 

@@ -20,7 +20,15 @@ from wildlab.analysis.tracks.ground_positions import (
     pose_correlation_time,
     thinned,
 )
-from wildlab.analysis.tracks.noise_model import ASSUMED, HERE, STATED, GivenValue, GivenValues, TargetModel
+from wildlab.analysis.tracks.noise_model import (
+    ASSUMED,
+    HERE,
+    STATED,
+    GivenValue,
+    GivenValues,
+    TargetModel,
+    Tuned,
+)
 from wildlab.analysis.tracks.scans import PLACED, truth_deviations, truths_at
 from wildlab.analysis.tracks.single_target import STATE
 from wildlab.analysis.tracks.tracker import read_inputs
@@ -73,7 +81,7 @@ _HULLS = {
 
 
 def model_jointly(
-    settings: Settings, single: TargetModel, places: list[PlacedScans]
+    settings: Settings, single: TargetModel, places: list[PlacedScans], tuned: Tuned | None = None
 ) -> tuple[ManyTargetModel, list[ManySensorModel], list[GivenValue]]:
     """What the tracker is given of the targets and of each sensor, and where each value is from.
 
@@ -85,6 +93,8 @@ def model_jointly(
         What filters of one target are given of the targets.
     places
         Of every sensor.
+    tuned
+        What other flights say of the sensors, beside what is stated.
 
     Raises
     ------
@@ -106,12 +116,12 @@ def model_jointly(
     values["hits"] = int(values["hits"])
     targets = ManyTargetModel(hulls, single.density, single.start_speed_m_s, **values)
     farthest = max((float(one.distances().max(initial=0.0)) for one in places), default=0.0)
-    each = [_of_sensor(settings, one, len(hulls), farthest) for one in places]
+    each = [_of_sensor(settings, one, len(hulls), farthest, tuned) for one in places]
     return targets, [one for one, _ in each], [*given.values, *(value for _, more in each for value in more)]
 
 
 def _of_sensor(
-    settings: Settings, placed: PlacedScans, kinds: int, farthest: float
+    settings: Settings, placed: PlacedScans, kinds: int, farthest: float, tuned: Tuned | None
 ) -> tuple[ManySensorModel, list[GivenValue]]:
     """``farthest``: m, the farthest detection of any sensor, for one that knows no distances."""
     part = settings.sensors.get(placed.sensor, SensorPart())
@@ -157,8 +167,12 @@ def _of_sensor(
     )
     if placed.kind in PLACED and placed.kind != "pixel":
         share, lasts = correlated_share(part)
-        words = f"{share:.2g}, for {lasts:.3g} s" if share else "0"
         source = ASSUMED if part.correlation is None else STATED
+        if part.correlation is None and tuned is not None and placed.sensor in tuned.sensors:
+            one_tuned = tuned.sensors[placed.sensor]
+            share, lasts = one_tuned.next_correlation, one_tuned.correlation_time_s
+            source = tuned.words
+        words = f"{share:.2g}, for {lasts:.3g} s" if share else "0"
         given.add("share of the errors' variance that lasts", words, source)
         found = found._replace(correlation=share, lasting_s=lasts)
     for name, what in _HULLS.items():
@@ -176,8 +190,10 @@ def correlated_share(part: SensorPart) -> tuple[float, float]:
     return part.correlation, part.correlation_time_s or np.inf
 
 
-def unknown_correlation(settings: Settings, places: Mapping[str, PlacedScans]) -> list[str]:
-    """Sensors of which nobody says how long their errors last.
+def unknown_correlation(
+    settings: Settings, places: Mapping[str, PlacedScans], tuned: Tuned | None = None
+) -> list[str]:
+    """Sensors of which nobody says how long their errors last, and no other flight against its truth.
 
     It is stated by ``correlation``, zero too, or considered errors; of a camera's pixels by
     ``correlation_time_s`` or considered errors, of bearings by ``thinning_s``.
@@ -186,6 +202,8 @@ def unknown_correlation(settings: Settings, places: Mapping[str, PlacedScans]) -
     for name, one in places.items():
         part = settings.sensors.get(name, SensorPart())
         key = {"pixel": "correlation_time_s", "bearing": "thinning_s"}.get(one.kind, "correlation")
+        if tuned is not None and tuned.against == "truth" and name in tuned.sensors:
+            continue
         if getattr(part, key) is None and (one.bearings or not part.considered):
             found.append(name)
     return found
@@ -299,6 +317,7 @@ def track_jointly(
     flight: Flight,
     *,
     settings: Settings | None = None,
+    tuned: Tuned | None = None,
     sensors: Sequence[str] = (),
     source: str | None = None,
 ) -> ManyTracks:
@@ -306,7 +325,7 @@ def track_jointly(
 
     Parameters
     ----------
-    settings, sensors, source
+    settings, tuned, sensors, source
         As for `wildlab.analysis.tracks.tracker.track`.
 
     Raises
@@ -314,7 +333,7 @@ def track_jointly(
     WildlabError
         As that, and where no detection tells a place.
     """
-    inputs = read_inputs(flight, settings=settings, sensors=sensors, source=source, joint=True)
+    inputs = read_inputs(flight, settings=settings, tuned=tuned, sensors=sensors, source=source, joint=True)
     stated = inputs.settings
     given = [one for one in inputs.given if one.what.startswith(("acceleration", "speed"))]
     notes = list(inputs.notes)
@@ -322,9 +341,12 @@ def track_jointly(
     for name, (scanned, belief, _, more) in inputs.sensors.items():
         given_here, unused = _considered_apart(list(dict.fromkeys(more)), scanned.kind)
         given += given_here
-        part = stated.sensors.get(name, SensorPart())
+        part, says = stated.sensors.get(name, SensorPart()), STATED
+        if tuned is not None and name in tuned.sensors and part.correlation_time_s is None:
+            lasts, says = tuned.sensors[name].correlation_time_s, tuned.words
+            part = part.model_copy(update={"correlation_time_s": lasts})
         if scanned.kind == "pixel":
-            given += given_of_pixels(flight, scanned, part)
+            given += given_of_pixels(flight, scanned, part, says)
         if unused:
             bearing = scanned.kind == "bearing"
             what = "Errors" if bearing else "An error of the clock"
@@ -349,7 +371,7 @@ def track_jointly(
             file=flight.folder,
             field="detections.kind",
         )
-    targets, models, more_given = model_jointly(stated, inputs.targets, list(places.values()))
+    targets, models, more_given = model_jointly(stated, inputs.targets, list(places.values()), tuned)
     lasting_s, shared = align_errors(
         [(one.errors, [scan.shared for scan in one.scans]) for one in places.values()]
     )
@@ -381,7 +403,7 @@ def track_jointly(
         inputs.targets.reach_m if np.isfinite(inputs.targets.reach_m) else CUTOFF_M,
         truth_sd,
         bool(stated.targets.many is not None and stated.targets.many.others),
-        unknown_correlation(stated, places),
+        unknown_correlation(stated, places, tuned),
         estimated,
     )
 

@@ -135,6 +135,15 @@ class SensorTuning(NamedTuple):
                self.tilt_sd_rad)  # fmt: skip
         return {name: sd for group, sd in zip(GROUPS, sds, strict=True) for name in group}
 
+    def of_each_target(self) -> SensorTuning:
+        """With nothing that several targets have in common, but for errors of a camera's pose."""
+        if self.kind == "pixel":
+            return self
+        return self._replace(
+            white_sds=tuple(self.sds.tolist()), position_sd_m=0.0, clock_sd_s=0.0, heading_sd_rad=0.0,
+            range_bias_sd_m=0.0, tilt_sd_rad=0.0,
+        )  # fmt: skip
+
     @property
     def next_correlation(self) -> float:
         """Correlation of the errors of two successive scans."""
@@ -275,8 +284,8 @@ Against = Literal["truth", "innovations"]
 class Tuned(NamedTuple):
     """What a flight says of its sensors.
 
-    ``flight`` is its name, ``against`` what its detections were held against. ``density`` (m/s per root
-    second) of the targets, where it was found too.
+    ``flight`` is its name, or those of several; ``against`` what detections were held against. ``density``
+    (m/s per root second) of the targets, where it was found too.
     """
 
     flight: str
@@ -284,10 +293,15 @@ class Tuned(NamedTuple):
     sensors: dict[str, SensorTuning]
     density: float | None = None
 
+    @property
+    def words(self) -> str:
+        """Who says so, in the table of what filters were given."""
+        return f"tuned on {self.flight}"
+
     def given_density(self) -> GivenValue:
         """For the table of what filters were given."""
         words = "acceleration, SD of the velocity that grows in a second"
-        return GivenValue("targets", words, f"{self.density or 0.0:.3g} m/s", f"tuned on {self.flight}")
+        return GivenValue("targets", words, f"{self.density or 0.0:.3g} m/s", self.words)
 
 
 def model_targets(stated: TargetsPart) -> tuple[TargetModel, list[GivenValue]]:
@@ -346,7 +360,7 @@ def model_noise(
     scans: Scans,
     settings: Settings,
     tuned: SensorTuning | None = None,
-    tuned_on: str = "",
+    by_tuning: str = "",
 ) -> tuple[NoiseModel, list[GivenValue]]:
     """What filters believe of one sensor of a flight, and what to say of it.
 
@@ -356,8 +370,8 @@ def model_noise(
         Of the sensor, by its clock as it is.
     settings
         From `settings_of`; what it states goes before what was tuned.
-    tuned, tuned_on
-        What another flight says of the sensor, and that flight's name.
+    tuned, by_tuning
+        What other flights say of the sensor, and `Tuned.words`.
 
     Raises
     ------
@@ -367,7 +381,6 @@ def model_noise(
     part = settings.sensors.get(scans.sensor, SensorPart())
     given = GivenValues(scans.sensor)
     found = None if tuned is None else noise_of_tuning(tuned)
-    by_tuning = f"tuned on {tuned_on}"
     noise, sources = _noise(flight, scans, settings, found, by_tuning)
     amounts = [_amount(name, float(sd)) for name, sd in zip(scans.elements, noise, strict=True)]
     for one in dict.fromkeys(zip(map(_noise_words, scans.elements), amounts, sources, strict=True)):

@@ -128,7 +128,10 @@ def read_inputs(
         if joint and scans.kind not in PLACEABLE and not sensors:
             notes.append(f"{name} was left out: what it detects ({scans.kind}) tells nothing of a place.")
             continue
-        there, on = (None, "") if tuned is None else (tuned.sensors.get(name), tuned.flight)
+        there, on = (None, "") if tuned is None else (tuned.sensors.get(name), tuned.words)
+        if joint and there is not None:
+            # What lasts is each target's own there: which part of it is seen.
+            there = there.of_each_target()
         noise, more = model_noise(flight, scans, stated, there, on)
         if noise.offset_s:
             scans = scans_of(flight, name, noise.offset_s, source)

@@ -1,4 +1,4 @@
-"""What one flight teaches about sensors and targets, for another one to be judged by.
+"""What flights teach about sensors and targets, for another one to be judged by.
 
 Against truth: how late a sensor's clock is, how large its errors are, how long they last and what of. Noise
 and errors that last are found together, by products of errors of each target (`fit_noise`); an error beyond
@@ -104,9 +104,9 @@ class Errors(NamedTuple):
 
 
 def tune(
-    flight: Flight, sensor: str, reach_of: Callable[[str], float], source: str | None = None
+    flights: Sequence[Flight], sensor: str, reach_of: Callable[[str], float], source: str | None = None
 ) -> SensorTuning:
-    """Estimate everything of a sensor from one flight with truth.
+    """Estimate everything of a sensor from flights with truth, with one clock for all of them.
 
     Parameters
     ----------
@@ -114,68 +114,90 @@ def tune(
         By kind: detections further from a target than this (m, or rad of bearings and pixels) are not its
         own, where they do not say what they are of.
     source
-        Name of the ``nav`` table; may be left out where there is one beside the truth's.
+        Name of the ``nav`` table, where a flight has it; may be left out where there is one beside the
+        truth's.
 
     Raises
     ------
     WildlabError
         Where fewer than `FEWEST` detections lie near a target, or the clock is further off than is looked.
     """
-    reach = reach_of(scans_of(flight, sensor, 0.0, source).kind)
+    seen = [_Seen(one, sensor, reach_of, source if source in one.nav else None) for one in flights]
     # Poses that belong to frames stay with them, whatever the clock says.
-    fixed = "frame_id" in flight.pose_source(source)[1]
-    found = _tuned(flight, sensor, reach, source, np.zeros(1) if fixed else OFFSETS_S)
+    found = _tuned(seen, np.zeros(1) if any(one.fixed for one in seen) else OFFSETS_S)
     if found.offset_s not in OFFSETS_S[[0, -1]]:
         return found
     if found.offset_low_s <= 0 <= found.offset_high_s:
         # Nothing here tells the time, as where nothing moves.
-        return _tuned(flight, sensor, reach, source, np.zeros(1))
+        return _tuned(seen, np.zeros(1))
     raise WildlabError(
         f"the stamps of {sensor!r} fit the truth best with {found.offset_s:+.1f} s added, and further is not "
         "looked: its clock is further off, or the truth is of something else",
         f"correct the clock of {sensor!r} or of the truth first (`wildlab check` compares them), then tune",
-        file=flight.folder,
+        file=flights[0].folder,
         field="time_s",
     )
 
 
-def _tuned(flight: Flight, sensor: str, reach: float, source: str | None, offsets: Array) -> SensorTuning:
+#: Between two flights, s: nothing lasts for so long.
+APART_S = 1e7
+
+
+class _Seen:
+    """What a sensor saw on a flight with truth, by its stamps with an offset."""
+
+    def __init__(
+        self, flight: Flight, sensor: str, reach_of: Callable[[str], float], source: str | None
+    ) -> None:
+        self.flight, self.sensor, self.source = flight, sensor, source
+        self.reach = reach_of(self.scans(0.0).kind)
+        self.fixed = "frame_id" in flight.pose_source(source)[1]
+        self.at_rest = bool(flight.table("truth")["time_s"].isna().all())
+
+    def scans(self, offset: float) -> Scans:
+        return scans_of(self.flight, self.sensor, offset, self.source)
+
+    def errors(self, offset: float) -> tuple[list[Errors], list[Array]]:
+        """Of each target, and how far away it was, m."""
+        scans = self.scans(offset)
+        truths = truths_at(self.flight, scans.times)
+        distances = [np.hypot(*(truth.position - scans.platform).T) for truth in truths]
+        return _errors_of(scans, truths, self.reach), distances
+
+
+def _tuned(seen: Sequence[_Seen], offsets: Array) -> SensorTuning:
     """The tuning with the best of some offsets; of one alone its interval is NaN."""
 
     def errors_at(offset: float) -> list[Errors]:
-        scans = scans_of(flight, sensor, offset, source)
-        return _errors_of(scans, truths_at(flight, scans.times), reach)
+        return [
+            one._replace(times=one.times + APART_S * number)
+            for number, each in enumerate(seen)
+            for one in each.errors(offset)[0]
+        ]
 
     offset, low, high = float(offsets[np.argmin(np.abs(offsets))]), float("nan"), float("nan")
     if len(offsets) > 1:
-        at_rest = bool(flight.table("truth")["time_s"].isna().all())
-        offset, low, high = _clock(errors_at, offsets, offset, at_rest)
-    scans = scans_of(flight, sensor, offset, source)
-    truths = truths_at(flight, scans.times)
-    errors, m = _errors_of(scans, truths, reach), scans.detections.shape[-1]
-    n = sum(int(one.known.sum()) for one in errors)
+        offset, low, high = _clock(errors_at, offsets, offset, all(one.at_rest for one in seen))
+    scans, errors = seen[0].scans(offset), errors_at(offset)
+    n, m = sum(int(one.known.sum()) for one in errors), scans.detections.shape[-1]
     if n < FEWEST:
         raise WildlabError(
-            f"only {n} detections of {sensor!r} lie near a target with truth",
+            f"only {n} detections of {scans.sensor!r} lie near a target with truth",
             "tune on a flight on which the sensor saw a target",
-            file=flight.folder,
+            file=seen[0].flight.folder,
             field="detections",
         )
     noise = fit_noise(errors, _groups(scans), scans.elements)
     H = np.concatenate([one.H[one.known] for one in errors])
     lasting = variance_of(H, noise).mean(axis=0)
     total = noise.white**2 + lasting
-    distance = np.concatenate(
-        [
-            np.hypot(*(truth.position - scans.platform).T)[one.known]
-            for truth, one in zip(truths, errors, strict=True)
-        ]
-    )
+    away = [distance for each in seen for distance in each.errors(offset)[1]]
+    distance = np.concatenate([far[one.known] for far, one in zip(away, errors, strict=True)])
     alike = len({NOISE_OF[name] for name in scans.elements}) == 1
     by_group = [noise.lasting[group[0]] if group else 0.0 for group in _groups(scans, every=True)]
     position, clock, heading, range_bias, tilt = (float(sd) for sd in by_group)
     return SensorTuning(
-        sensor, scans.kind, offset, low, high, float(np.sqrt(total.mean())),
+        scans.sensor, scans.kind, offset, low, high, float(np.sqrt(total.mean())),
         float((lasting / total).mean()), noise.time_s, position, clock, heading, float(distance.mean()),
         float(distance.std()), scans.interval_s, n, tuple(noise.white.tolist()),
         () if alike and m > 1 else tuple(np.sqrt(total).tolist()), range_bias, tilt,
@@ -360,7 +382,10 @@ class _Case(NamedTuple):
 
 
 def tune_by_innovations(
-    flight: Flight, sensors: Sequence[str], settings: Settings | None = None, source: str | None = None
+    flights: Sequence[Flight],
+    sensors: Sequence[str],
+    settings: Settings | None = None,
+    source: str | None = None,
 ) -> tuple[dict[str, SensorTuning], float]:
     """For each sensor a factor on its noise, and the liveliness of the targets, together.
 
@@ -376,20 +401,29 @@ def tune_by_innovations(
     WildlabError
         Where fewer than `FEWEST` detections of a sensor can be followed.
     """
-    inputs = read_inputs(flight, settings=settings, sensors=sensors, source=source)
-    targets, cases = inputs.targets, list[_Case]()
-    for sensor, one in inputs.sensors.items():
-        mine = [case for truth in one.truths for case in _cases(sensor, one, truth.target, targets)]
+    each = [
+        read_inputs(one, settings=settings, sensors=sensors, source=source if source in one.nav else None)
+        for one in flights
+    ]
+    inputs, targets = each[0], each[0].targets
+    names, cases = list(inputs.sensors), list[_Case]()
+    for sensor in names:
+        seen = [one.sensors[sensor] for one in each]
+        mine = [
+            case
+            for one in seen
+            for truth in one.truths
+            for case in _cases(sensor, one, truth.target, targets)
+        ]
         used = sum(_count(case) for case in mine)
         if used < FEWEST:
             raise WildlabError(
                 f"only {used} detections of {sensor!r} can be followed",
                 "tune on a longer flight",
-                file=flight.folder,
+                file=flights[0].folder,
                 field="detections",
             )
         cases += mine
-    names = list(dict.fromkeys(one.sensor for one in cases))
 
     def cost(logs: Array) -> float:
         if np.abs(logs).max() > np.log(FARTHEST):
@@ -468,34 +502,34 @@ def read_tuned(text: str) -> Tuned | None:
     return Tuned(data["flight"], data["against"], sensors, data["density"])
 
 
-def tune_flight(
-    flight: Flight,
+def tune_flights(
+    flights: Sequence[Flight],
     sensors: Sequence[str],
     settings: Settings | None = None,
     against: Against | None = None,
     source: str | None = None,
 ) -> Tuned:
-    """Tune sensors on a flight: against truth where it has any, else by the likelihood of innovations.
+    """Tune sensors on flights: against truth where all have any, else by the likelihood of innovations.
 
     Raises
     ------
     WildlabError
-        Where truth is asked for and not there, or the flight shows too little of a sensor.
+        Where truth is asked for and not there, or the flights show too little of a sensor.
     """
-    has_truth = flight.truth is not None and len(flight.truth) > 0
-    if against == "truth" and not has_truth:
+    names = ", ".join(one.name for one in flights)
+    without = [one for one in flights if one.truth is None or not len(one.truth)]
+    if against == "truth" and without:
         raise WildlabError(
-            f"the flight {flight.name!r} has no truth to tune against",
+            f"the flight {without[0].name!r} has no truth to tune against",
             "use --against innovations, or another flight",
-            file=flight.folder,
+            file=without[0].folder,
             field="--against",
         )
-    if against == "innovations" or not has_truth:
-        found, density = tune_by_innovations(flight, sensors, settings, source)
-        return Tuned(flight.name, "innovations", found, density)
-    reach = model_targets(settings_of(flight, settings).targets)[0].reach
-    found = {sensor: tune(flight, sensor, reach, source) for sensor in sensors}
-    return Tuned(flight.name, "truth", found)
+    if against == "innovations" or without:
+        found, density = tune_by_innovations(flights, sensors, settings, source)
+        return Tuned(names, "innovations", found, density)
+    reach = model_targets(settings_of(flights[0], settings).targets)[0].reach
+    return Tuned(names, "truth", {sensor: tune(flights, sensor, reach, source) for sensor in sensors})
 
 
 #: Fewest detections alike, stamp and values, by which two flights are one, and their share of the smaller.
