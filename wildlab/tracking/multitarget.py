@@ -263,11 +263,10 @@ def step(
     seen = _within_reach(scan, sensor, tracks.C.shape[-1])
     mean, _ = tracks.estimate()
     inside = _sees(mean[:, :2], scan, sensor)
-    rows, away = np.flatnonzero(inside), np.flatnonzero(~inside)
-    watched, rest = tracks.only(rows), tracks.only(away)
     # A target gets older while it is looked at: since any sensor did, or this one could have.
-    aged = np.minimum(scan.time - watched.looked.max(axis=1, initial=-np.inf), own_dt)
-    watched = watched._replace(existence=still_there(watched.existence, aged, targets.lifetime_s))
+    aged = np.minimum(scan.time - tracks.looked.max(axis=1, initial=-np.inf), own_dt) * inside
+    tracks = tracks._replace(aged=aged, existence=still_there(tracks.existence, aged, targets.lifetime_s))
+    watched, rest = tracks.only(np.flatnonzero(inside)), tracks.only(np.flatnonzero(~inside))
     watched, seen, taken = _corrected(watched, seen, scan, sensors, targets)
     if sensor.bearings:
         return alive(both(watched, rest), targets), first
@@ -517,7 +516,7 @@ def _back(
         *white_acceleration(dt, targets.density),
         psi,
     )
-    lasts = np.exp(-dt / targets.lifetime_s)
+    lasts = still_there(1.0, new.aged, targets.lifetime_s)
     # Of one that does not exist at the next scan: that it did before, and ended.
     ended = old.existence * (1 - lasts) / (1 - old.existence * lasts)
     ended = known.existence + (1 - known.existence) * ended

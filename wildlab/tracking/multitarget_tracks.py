@@ -213,8 +213,8 @@ class Tracks(NamedTuple):
         them those that each target has of its own (`wildlab.tracking.target_model.own_lasting`).
     kinds
         (T, K) probabilities.
-    existence
-        (T,) probability.
+    existence, aged
+        (T,) probability, and for how much longer than at the scan before it was looked at, s.
     visible, looked
         (T, S) probability that a sensor can see it, and when that was so, s.
     identity, hits
@@ -232,6 +232,7 @@ class Tracks(NamedTuple):
     C: Array
     kinds: Array
     existence: Array
+    aged: Array
     visible: Array
     looked: Array
     identity: NDArray[np.int64]
@@ -267,7 +268,9 @@ def no_tracks(kinds: int, sensors: int, errors: int = 0) -> Tracks:
     one = np.zeros(0)
     of_kinds, of_sensors = np.zeros((0, kinds)), np.zeros((0, sensors))
     x, P, C = (np.zeros((0, kinds, 4, *more)) for more in ((), (4,), (errors,)))
-    return Tracks(x, P, C, of_kinds, one, of_sensors, of_sensors, whole, whole, one, whole, flag, flag, ())
+    return Tracks(
+        x, P, C, of_kinds, one, one, of_sensors, of_sensors, whole, whole, one, whole, flag, flag, ()
+    )
 
 
 def both(tracks: Tracks, more: Tracks) -> Tracks:
@@ -322,6 +325,7 @@ def begin(
         C,
         np.tile(share / share.sum(), (count, 1)),
         np.full(count, targets.birth),
+        np.zeros(count),
         visible,
         np.full((count, len(sensors)), time),
         np.arange(first, first + count),

@@ -88,6 +88,20 @@ def test_what_ends_ended_when_it_was_seen_last_and_what_comes_back_was_there():
     assert counts[2] == [1] * 30 and (np.array([one.existence[0] for one in back[:21]]) > 0.99).all()
 
 
+def test_nobody_grows_old_unwatched_before_or_after():
+    """Seen three times, out of view for long, then missed twice: it is there, or ended at either look."""
+    eye = EYE._replace(detection=0.6, patience_s=1e6)
+    targets = POINTS._replace(lifetime_s=8.0, visible_s=1e12, hidden_s=1e-3, shown=0.0, hits=1, confirmed=0.0)
+    away = [look(float(t))._replace(sees=lambda places: np.zeros(len(places), bool)) for t in range(3, 40)]
+    scans = [*(look(float(t), [0.0, 0.0]) for t in range(3)), *away, look(40.0), look(41.0)]
+    before = [tracks.existence[0] for tracks, _ in follow_many(scans, [eye], targets)]
+    r, lasts, missed = before[2], np.exp(-1 / 8.0), 0.4
+    there = r * (1 - lasts + lasts * missed * (1 - lasts + lasts * missed))
+    back = [one.existence[0] for one in smooth_many(scans, [eye], targets)[1]]
+    assert back[2:40] == pytest.approx([there / (there + 1 - r)] * 38, rel=1e-6)
+    assert before[3:40] == pytest.approx([r] * 37)
+
+
 @given(GENERATORS)
 @settings(max_examples=8, deadline=None)
 def test_covariances_are_those_of_the_errors_of_smoothed_tracks(rng):
