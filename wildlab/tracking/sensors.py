@@ -194,8 +194,11 @@ def angles_at(sensor: Sensor, row: int) -> tuple[bool, ...]:
 
 def difference(z: ArrayLike, predicted: ArrayLike, angles: tuple[bool, ...]) -> Array:
     """Innovation (..., m): measurement minus prediction, angles wrapped (H 6.11)."""
-    gap = np.asarray(z, float) - np.asarray(predicted, float)
-    return np.where(np.asarray(angles), wrap(gap), gap)
+    gap = np.asarray(np.asarray(z, float) - np.asarray(predicted, float))
+    wrapped = np.asarray(angles, bool)
+    if wrapped.any():
+        gap[..., wrapped] = wrap(gap[..., wrapped])
+    return gap
 
 
 def on_state(H_position: Array, n: int) -> Array:

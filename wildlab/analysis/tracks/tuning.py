@@ -12,12 +12,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 from scipy.optimize import minimize, nnls
+from scipy.stats import t as student_t
 
 from wildlab.analysis.tracks.noise_model import (
     GROUPS,
@@ -63,8 +65,6 @@ LAGS_S = np.array([0.0, *0.05 * LAG_STEP ** np.arange(68)])
 LEAST_WHITE = 0.1
 #: Fewest errors from which anything is estimated.
 FEWEST = 20
-#: Half of chi-square's 95 % point with one degree of freedom: how far a log-likelihood may lie below its top.
-DROP = 1.92
 
 
 class Noise(NamedTuple):
@@ -150,7 +150,13 @@ class _Seen:
         self, flight: Flight, sensor: str, reach_of: Callable[[str], float], source: str | None
     ) -> None:
         self.flight, self.sensor, self.source = flight, sensor, source
-        self.reach = reach_of(self.scans(0.0).kind)
+        scans = self.scans(0.0)
+        self.reach, self.interval_s = reach_of(scans.kind), scans.interval_s
+        if scans.labelled:
+            # What saw nothing teaches nothing then, and of a camera's images these are most.
+            frames = flight.table("frames")
+            mine = frames["frame_id"].isin(flight.table("detections")["frame_id"])
+            self.flight = replace(flight, tables=flight.tables | {"frames": frames[mine]})
         self.fixed = "frame_id" in flight.pose_source(source)[1]
         self.at_rest = bool(flight.table("truth")["time_s"].isna().all())
 
@@ -199,7 +205,7 @@ def _tuned(seen: Sequence[_Seen], offsets: Array) -> SensorTuning:
     return SensorTuning(
         scans.sensor, scans.kind, offset, low, high, float(np.sqrt(total.mean())),
         float((lasting / total).mean()), noise.time_s, position, clock, heading, float(distance.mean()),
-        float(distance.std()), scans.interval_s, n, tuple(noise.white.tolist()),
+        float(distance.std()), seen[0].interval_s, n, tuple(noise.white.tolist()),
         () if alike and m > 1 else tuple(np.sqrt(total).tolist()), range_bias, tilt,
     )  # fmt: skip
 
@@ -224,18 +230,19 @@ def _clock(
     best, where = now, offsets[::COARSE]
     for _ in range(2):
         errors = errors_at(best)
-        scale = _scale([one.error for one in errors])
-        each = _independent(errors, at_rest)
-        found = {o: each * _halves(errors_at(o), scale) for o in sorted({*where.tolist(), now})}
+        scale, number = _scale([one.error for one in errors]), _independent(errors, at_rest)
+        found = {o: number * _halves(errors_at(o), scale) / 2 for o in sorted({*where.tolist(), now})}
         best = min(found, key=lambda one: found[one].sum())
         at = int(np.argmin(np.abs(offsets - best)))
         where = offsets[max(at - 4 * COARSE, 0) : at + 4 * COARSE + 1]
     tried, costs = np.array(list(found)), np.array(list(found.values()))
     whole = costs.sum(axis=1)
-    near = tried[whole <= whole.min() + DROP]
+    # As Student's t has it: of few independent errors their size is known badly, too.
+    drop = float(student_t.ppf(0.975, max(number.sum() - 1, 1.0))) ** 2 / 2
+    near = tried[whole <= whole.min() + drop]
     of_other = costs[costs.argmin(axis=0)[::-1], [0, 1]]
     agreed = not at_rest or (found[now] > of_other).all()
-    if agreed and whole[tried == now] > whole.min() + DROP:
+    if agreed and whole[tried == now] > whole.min() + drop:
         return best, float(near.min()), float(near.max())
     return now, min(float(near.min()), now), max(float(near.max()), now)
 
@@ -249,34 +256,38 @@ def _scale(errors: Sequence[Array]) -> Array:
     )
 
 
-def _independent(errors: list[Errors], together: bool) -> float:
-    """How many independent errors one is worth: each target's by themselves, or all one after the other."""
+def _halved(errors: list[Errors]) -> tuple[list[Errors], list[Errors]]:
+    """Either half of the targets, or of the time of one alone."""
+    if len(errors) > 1:
+        return errors[::2], errors[1::2]
+    middle = int(np.searchsorted(errors[0].times, np.median(errors[0].times)))
+    return [errors[0].only(slice(middle))], [errors[0].only(slice(middle, None))]
+
+
+def _independent(errors: list[Errors], together: bool) -> Array:
+    """(2,) how many independent errors those of either half are worth: each target's by themselves, or all
+    one after the other. Those that are missed count like the others."""
     known = [one.error[one.known] for one in errors]
     if together:
         order = np.argsort(np.concatenate([one.times[one.known] for one in errors]), kind="stable")
         known = [np.concatenate(known)[order]]
     each = [max(map(worth, one.T)) for one in known if len(one)]
-    return float(sum(each) / max(sum(map(len, known)), 1))
+    share = float(sum(each) / max(sum(map(len, known)), 1))
+    return np.array(
+        [share * sum((~np.isnan(one.error)).all(axis=1).sum() for one in half) for half in _halved(errors)]
+    )
 
 
 def _halves(errors: list[Errors], scale: Array) -> Array:
-    """(2,) half the squares of errors in units of their scale, of either half of the targets, or of the time
-    of one alone.
+    """(2,) mean square of errors in units of their scale, of either half; gross ones count as at `GROSS`.
 
-    Gross errors count as ones at `GROSS`. A scan that an offset takes out of the truth's time counts as the
-    mean of the others: none gains by it.
+    None gains by scans that an offset takes out of the truth's time.
     """
-    if len(errors) > 1:
-        halves = errors[::2], errors[1::2]
-    else:
-        middle = int(np.searchsorted(errors[0].times, np.median(errors[0].times)))
-        halves = [errors[0].only(slice(middle))], [errors[0].only(slice(middle, None))]
     found = []
-    for half in halves:
+    for half in _halved(errors):
         error = np.concatenate([one.error for one in half])
         squares = np.minimum((error[~np.isnan(error).any(axis=1)] / scale) ** 2, GROSS**2).sum(axis=1)
-        scans = sum(len(one.times) for one in half)
-        found.append(squares.mean() * scans / 2 if len(squares) else 0.0)
+        found.append(squares.mean() if len(squares) else 0.0)
     return np.array(found)
 
 
