@@ -118,7 +118,7 @@ def test_correlated_values_are_worth_less():
     assert worth(slow) < 80
     assert worth([]) == 0.0
     assert worth(np.full(9, np.nan)) == 0.0
-    mean = mean_of_runs([Series("NIS", 2, np.arange(2000.0), slow)])
+    mean = mean_of_runs([Series("NIS", 2, np.arange(2000.0), slow, worth(slow))])
     assert mean.high - mean.low > 10 * (lambda band: band[1] - band[0])(chi_square_interval(2, runs=2000)) / 2
 
 

@@ -3,11 +3,13 @@
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.signal import lfilter
 
 from tests.analysis.conftest import build, changed, score
-from wildlab.analysis.accuracy import errors_by_target
-from wildlab.analysis.georeference import ALIKE_M, blocks_of
+from wildlab.analysis.accuracy import errors_by_target, is_known, judge_accuracy
+from wildlab.analysis.georeference import ALIKE_M, blocks_of, observe
 from wildlab.analysis.georeference import best_known as best
+from wildlab.evaluation.intervals import block_mean
 from wildlab.flight.store import Flight
 
 N = 40
@@ -26,8 +28,10 @@ def walked(mark_sd: float = 0.02, walker_sd: float = 3.0, lasts: int = N) -> Fli
     return changed(flight, detections=detections, truth=pd.concat([marks, track], ignore_index=True))
 
 
-def test_the_headline_is_of_the_best_known_truth():
-    rows = score(walked())
+def test_the_headline_and_the_ellipses_are_of_the_best_known_truth(monkeypatch):
+    monkeypatch.setattr("wildlab.analysis.accuracy.diagnose", lambda *_: None)
+    rows, whole = score(walked()), judge_accuracy(observe(walked(), None), np.random.default_rng(0))
+    assert whole.summary.n == whole.ellipses.n == 3 * N
     assert set(rows.loc[~rows["best_truth"], "truth_id"]) == {"walker"}
     assert len(best(rows)) == 3 * N
 
@@ -64,8 +68,21 @@ def test_an_interval_needs_independent_errors(lasts, known):
     assert len(np.unique(blocks_of(flight, scored))) >= 5
 
 
+@pytest.mark.filterwarnings("error")
 def test_targets_stand_in_the_order_that_the_headline_takes():
     """A mark that states nothing is exact, a track that states nothing comes last."""
     for mark_sd, walker_sd in ((np.nan, 3.0), (0.02, np.nan), (0.02, 3.0)):
         flight = walked(mark_sd, walker_sd)
         assert errors_by_target(flight, score(flight))["target"].iloc[-1] == "walker"
+
+
+@pytest.mark.parametrize("count", [6, 10, 20])
+@pytest.mark.parametrize("alike", [0.0, 0.5, 0.8, 0.9, 0.95])
+def test_an_interval_that_is_shown_is_seldom_wrong_however_alike_blocks_are(count, alike):
+    """Of 600 flights: by the estimate alone up to 16 % would show a wrong one."""
+    drawn = np.random.default_rng(2).normal(size=(600, count + 200)) * np.sqrt(1 - alike**2)
+    errors, blocks = lfilter([1], [1, -alike], drawn, axis=1)[:, 200:], np.arange(count)
+    shown = [block_mean(one, blocks, 0.95) for one in errors if is_known(one, blocks)]
+    assert np.mean([not low <= 0 <= high for _, low, high in shown] or [0]) * len(shown) / 600 < 0.06
+    if count == 20 and alike == 0:
+        assert len(shown) > 0.75 * 600

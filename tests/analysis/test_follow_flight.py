@@ -9,12 +9,17 @@ import pytest
 from tests.analysis.robots import boat, joined, paused, robot, robot_flight, rows_of
 from wildlab.analysis.tracks.scans import SLOTS, predict_scan, scans_of, truths_at
 from wildlab.analysis.tracks.tracker import (
+    CAUTIOUS,
+    CONSISTENT,
+    OVERCONFIDENT,
+    UNKNOWN,
     compare_sensors,
     estimates_table,
     track,
-    worth_of_errors,
+    verdict,
     write_estimates,
 )
+from wildlab.evaluation.consistency import average
 from wildlab.flight.manifest import Settings
 
 # --- a heading that is off ----------------------------------------------------------------------------------
@@ -25,7 +30,8 @@ def test_a_considered_heading_is_inside_the_bounds_where_the_white_filter_is_not
     off = 2.0 if seed % 2 else -2.0
     rows = rows_of(track(robot_flight(seed, heading_off_deg=off, heading_sd_deg=2.0)))
     assert list(rows.index[:2]) == ["ekf", "schmidt"]
-    assert rows.loc["schmidt", "verdict"] == "consistent"
+    # Its error is one for the whole flight, which decides nothing; nothing speaks against it.
+    assert rows.loc["schmidt", "nees_low"] < rows.loc["schmidt", "nees"] < rows.loc["schmidt", "nees_high"]
     assert rows.loc["ekf", "verdict"] == "overconfident" and rows.loc["ekf", "nees"] > 20
     # Both are as far off: nothing estimates the heading.
     assert rows.loc["schmidt", "rmse"] == pytest.approx(rows.loc["ekf", "rmse"], rel=0.1)
@@ -144,7 +150,8 @@ def test_two_sensors_in_one_track_share_what_the_platform_has_wrong():
     other = robot_flight(51, kind="position", heading_off_deg=2.0, sensor="lidar")
     followed = track(joined(one, other))
     rows = rows_of(followed, "together")
-    assert rows.loc["schmidt", "verdict"] == "consistent"
+    # Its error is one for the whole flight, which decides nothing; nothing speaks against it.
+    assert rows.loc["schmidt", "nees_low"] < rows.loc["schmidt", "nees"] < rows.loc["schmidt", "nees_high"]
     assert rows.loc["ekf", "verdict"] == "overconfident"
     assert rows.loc["ekf", "detections"] > 470
     (pair,) = (pair for pair in compare_sensors(followed) if pair.filter == "schmidt")
@@ -179,9 +186,17 @@ def test_estimates_say_what_was_used_and_how_sure_they_are(tmp_path):
     np.testing.assert_allclose(truth[:, 0] - ekf["north_m"], ekf["error_north_m"], atol=1e-9)
 
 
-def test_a_standing_error_is_one_independent_value():
-    rng = np.random.default_rng(0)
-    eye = np.tile(np.eye(2), (400, 1, 1))
-    assert worth_of_errors(rng.normal(size=(400, 2)), eye) > 200
-    standing = np.tile(rng.normal(size=2), (400, 1)) + rng.normal(0, 0.05, (400, 2))
-    assert worth_of_errors(standing, eye) < 3
+@pytest.mark.parametrize(
+    ("mean", "worth", "n", "word"),
+    [
+        (2.0, 40.0, 100, CONSISTENT),
+        # A band about 3.9 that reaches from 0.5 to 4.4 says nothing of the filter, one beyond it does.
+        (3.9, 4.0, 100, UNKNOWN),
+        (5.0, 4.0, 100, OVERCONFIDENT),
+        (0.2, 4.0, 100, CAUTIOUS),
+        (3.9, 40.0, 100, OVERCONFIDENT),
+        (9.0, 19.0, 19, UNKNOWN),
+    ],
+)
+def test_a_filter_is_consistent_only_where_one_wrong_by_a_factor_of_two_would_not_be(mean, worth, n, word):
+    assert verdict(average(np.full(n, mean), 2, worth)) == word

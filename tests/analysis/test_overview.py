@@ -23,6 +23,7 @@ from wildlab.evaluation.streams import FLOOR_HZ, pace_of, vibration_of
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import euler_to_matrix
+from wildlab.messages.catalogue import load_texts
 from wildlab.reporting.overview import counts_of, show_overview
 from wildlab.reporting.report import open_report
 from wildlab.simulation.twins import simulate_twin
@@ -188,6 +189,13 @@ def test_gains_and_troubles_are_recorded_and_no_place_is_given_away(tmp_path):
     origin = flight.manifest.origin
     for value in (origin.latitude_deg, origin.longitude_deg):
         assert f"{value:.3f}" not in html and f"{value:.2f}" not in html
+
+
+@pytest.mark.parametrize(("flight", "key"), [(holed(), "path-troubles"), (build(n_images=10), "path")])
+def test_the_caption_speaks_of_troubles_only_where_there_are_some(flight, key, tmp_path):
+    figures, html = load_texts("overview").figures, page_of(flight, tmp_path)[0]
+    assert figures[key].alt in html and figures[key].caption in html
+    assert (figures["path-troubles"].caption in html) == (key == "path-troubles")
 
 
 def without(flight: Flight, *, nav: bool = True, tables: tuple[str, ...] = ()) -> Flight:

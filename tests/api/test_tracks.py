@@ -25,8 +25,7 @@ from wildlab.analysis.tracks.pixels import (
 from wildlab.analysis.tracks.single_target import TOGETHER
 from wildlab.analysis.tracks.tracker import STATE, estimates_table, score_tracks
 from wildlab.api import tracks
-from wildlab.api.tracks import FEW_INDEPENDENT, Consistency
-from wildlab.evaluation.consistency import Average, Series, chi_square_interval
+from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.flight.clocks import poses_at
 from wildlab.flight.files import check_model
 from wildlab.flight.manifest import Settings, parse_settings
@@ -217,16 +216,6 @@ def test_anybodys_filter_by_its_errors_and_covariances():
         with pytest.raises(wildlab.WildlabError) as caught:
             wildlab.consistency(**wrong)
         assert caught.value.field == "covariances"
-
-
-@pytest.mark.parametrize(("worth", "hedged"), [(FEW_INDEPENDENT - 1, True), (FEW_INDEPENDENT + 1, False)])
-@pytest.mark.parametrize(("mean", "verdict"), [(9.0, "overconfident"), (0.1, "too cautious")])
-def test_a_verdict_on_few_independent_values_says_so(worth, hedged, mean, verdict):
-    low, high = chi_square_interval(2, runs=worth)
-    series = Series("NIS", 2, np.arange(2.0), np.full(2, mean))
-    average = Average(mean, low, high, 100, worth)
-    text = repr(Consistency({"NIS": average}, {"NIS": (series,)}))
-    assert verdict in text and ("few" in text) == hedged
 
 
 def test_an_error_that_lasts_is_one_value():

@@ -8,10 +8,12 @@ from scipy.stats import chi2, kstest
 from wildlab.evaluation.consistency import (
     autocorrelation,
     average,
+    chi_square_interval,
     innovation_whiteness,
     portmanteau,
     white_bound,
     worth,
+    worth_of_errors,
 )
 
 
@@ -62,15 +64,28 @@ def test_what_lasts_beneath_white_noise_is_counted():
     assert np.isclose(np.mean(found), 1 / (1 + 0.98 / 0.02), rtol=0.3)
 
 
-@pytest.mark.parametrize(("rho", "n"), [(0.5, 50), (0.9, 50), (0.9, 200), (0.97, 50), (0.97, 2000)])
-def test_the_band_of_a_mean_holds_that_of_a_consistent_filter(rho, n):
-    """Errors of a first-order process, 500 runs: sums of autocorrelations alone hold 75 % of short ones."""
-    noise = np.sqrt(1 - rho**2) * np.random.default_rng(n).normal(size=(500, n + 300, 2))
-    errors = lfilter([1], [1, -rho], noise, axis=1)[:, 300:]
-    runs = [average(nees, 2, worth(nees)) for nees in (errors**2).sum(axis=2)]
-    assert 0.92 < np.mean([run.inside for run in runs]) < 0.99
-    # It is no wider than it has to be.
-    assert np.median([run.worth for run in runs]) > 0.5 * n * (1 - rho**2) / (1 + rho**2)
+@pytest.mark.parametrize("n", [50, 200, 1000])
+@pytest.mark.parametrize(
+    ("share", "rho", "wider"),
+    [(0.0, 0.0, 1.1), (1.0, 0.5, 1.5), (1.0, 0.9, 4.0), (1.0, 0.97, 8.0), (0.2, 0.98, 3.5), (0.5, 0.98, 5.0)],
+)
+def test_the_band_of_a_mean_holds_that_of_a_consistent_filter(share, rho, wider, n):
+    """Of 400 runs: white noise, first-order processes, and one beneath white noise, of which correlations of
+    squares see so little that 67 to 89 % would be inside."""
+    drawn = np.random.default_rng(1).normal(size=(2, 400, n + 400, 2))
+    drawn[0] *= np.sqrt(1 - rho**2)
+    slow = lfilter([1], [1, -rho], drawn[0], axis=1)[:, 400:]
+    errors = np.sqrt(share) * slow + np.sqrt(1 - share) * drawn[1, :, 400:]
+    runs = [average((one**2).sum(axis=1), 2, worth_of_errors(one)) for one in errors]
+    assert 0.89 < np.mean([run.inside for run in runs]) < 0.995
+    low, high = chi_square_interval(2, runs=n)
+    assert np.median([run.high - run.low for run in runs]) < wider * (high - low)
+
+
+def test_an_error_that_stands_is_one_value_however_its_square_wavers():
+    rng = np.random.default_rng(0)
+    assert worth_of_errors(rng.normal(size=2) + rng.normal(0, 0.05, (400, 2))) < 3
+    assert worth_of_errors(np.full((3, 2), np.nan)) == 0.0
 
 
 def test_portmanteau_of_one_element_is_ljung_and_box():

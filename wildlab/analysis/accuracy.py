@@ -90,7 +90,7 @@ class Accuracy:
     assumed
         The standard deviations that the ellipses come from.
     ellipses
-        What they are worth.
+        What they are worth, of the same points as the summary.
     diagnosis
         The cause, where six images or more show a known point.
     visible_m
@@ -115,8 +115,9 @@ class Accuracy:
         return best_known(self.scored)
 
 
-#: Of fewer independent blocks than this an interval is a guess.
-FEWEST_INDEPENDENT = 5
+#: Of fewer independent blocks than this an interval is a guess; that there are as many has to be sure with a
+#: probability of 95 %: few blocks often look independent by chance, and their interval is then too narrow.
+FEWEST_INDEPENDENT, SURELY = 5, 1.645
 
 
 def errors_by_target(flight: Flight, scored: pd.DataFrame) -> pd.DataFrame:
@@ -135,15 +136,20 @@ def errors_by_target(flight: Flight, scored: pd.DataFrame) -> pd.DataFrame:
         ``target``, ``kind`` (``mark`` or ``track``), ``sd`` (reported of the truth, m, or NaN), ``n``,
         ``mean`` (m), ``low`` and ``high`` (95 %; NaN of fewer than `FEWEST_INDEPENDENT` independent blocks).
     """
-    truth, rows = dict(list(flight.table("truth").groupby("target_id"))), []
+    truth, rows = flight.table("truth"), []
+    stated = (
+        truth.reindex(columns=["target_id", "sd_horizontal_m"])
+        .groupby("target_id")["sd_horizontal_m"]
+        .median()
+    )
+    tracks = set(truth.loc[truth["time_s"].notna(), "target_id"])
     blocks = pd.Series(blocks_of(flight, scored), scored.index)
     for target, points in scored.dropna(subset=["error_m"]).groupby("truth_id"):
-        kind = "track" if truth[target]["time_s"].notna().any() else "mark"
-        sd = truth[target].get("sd_horizontal_m", pd.Series(dtype=float)).median()
         error = block_mean(points["error_m"], blocks[points.index], 0.95)
         known = is_known(points["error_m"], blocks[points.index])
         low, high = (max(error.low, 0.0), error.high) if known else (np.nan, np.nan)
-        rows.append([target, kind, sd, len(points), error.estimate, low, high])
+        kind = "track" if target in tracks else "mark"
+        rows.append([target, kind, stated[target], len(points), error.estimate, low, high])
     table = pd.DataFrame(rows, columns=["target", "kind", "sd", "n", "mean", "low", "high"])
     # A mark that reports nothing counts as exact, a track as anything.
     counts = table["sd"].fillna(table["kind"].map({"mark": 0.0, "track": np.inf}))
@@ -152,14 +158,14 @@ def errors_by_target(flight: Flight, scored: pd.DataFrame) -> pd.DataFrame:
 
 
 def is_known(values: ArrayLike, blocks: ArrayLike) -> bool:
-    """Whether values (N,) in blocks (N,) have independent ones enough for an interval.
+    """Whether values (N,) in blocks (N,) surely have independent ones enough for an interval.
 
     Examples
     --------
-    >>> is_known([1.0, 1.1, 0.9, 1.2, 0.8, 1.0], range(6)), is_known(np.sin(np.arange(20) / 4), range(20))
+    >>> is_known([1.0, 0.0, 1.0, 0.0, 1.0, 0.0], range(6)), is_known(np.sin(np.arange(20) / 4), range(20))
     (True, False)
     """
-    return len(np.unique(blocks)) > 1 and independent_blocks(values, blocks) >= FEWEST_INDEPENDENT
+    return len(np.unique(blocks)) > 1 and independent_blocks(values, blocks, SURELY) >= FEWEST_INDEPENDENT
 
 
 def judge_accuracy(
@@ -216,7 +222,7 @@ def judge_accuracy(
         by_target=errors_by_target(flight, scored),
         lost=int((~np.isfinite(scored["error_m"])).sum()),
         assumed=used_deviations(observations, deviations),
-        ellipses=judge_ellipses(errors_of(scored), error_covariances(scored), blocks, rng),
+        ellipses=judge_ellipses(errors_of(scored[best]), error_covariances(scored[best]), blocks[best], rng),
         diagnosis=diagnosis,
         visible_m=visible_error(flight, scored) if by_nearest else np.nan,
     )

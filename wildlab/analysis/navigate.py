@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import (
-    nees,
+    whiten,
 )
 from wildlab.flight.checks.inertial import FLYING
 from wildlab.flight.clocks import covariance_columns, covariances, frame_times, gnss_times, poses_at
@@ -496,14 +496,19 @@ BLOCKS = {"position": slice(0, 3), "velocity": slice(3, 6), "attitude": slice(6,
 class NavigationErrors(NamedTuple):
     """Errors (K, 9) at K times: position (m) and velocity (m/s) in n, attitude (rad) in b; see the module.
 
-    ``sd`` (K, 9) is what the estimate states of them and ``nees`` has (K,) for each block, not divided by its
-    three degrees of freedom; both NaN where nothing is stated.
+    ``sd`` (K, 9) is what the estimate states of them, and ``white`` (K, 9) has the errors of each block in
+    units of their own standard deviations; both NaN where nothing is stated.
     """
 
     times: Array
     error: Array
     sd: Array
-    nees: dict[str, Array]
+    white: Array
+
+    @property
+    def nees(self) -> dict[str, Array]:
+        """(K,) of each block, not divided by its three degrees of freedom."""
+        return {name: (self.white[:, part] ** 2).sum(axis=1) for name, part in BLOCKS.items()}
 
 
 def reference_of(flight: Flight) -> str:
@@ -590,8 +595,8 @@ def errors_against(
             P[k][pose] = poses[rows[k]]
     if velocity_covariance is not None:
         P[at, 3:6, 3:6] = velocity_covariance[rows[at]]
-    blocks = {name: nees(error[:, part], P[:, part, part]) for name, part in BLOCKS.items()}
-    return NavigationErrors(t, error, np.sqrt(np.diagonal(P, axis1=1, axis2=2)), blocks)
+    white = np.concatenate([whiten(error[:, part], P[:, part, part]) for part in BLOCKS.values()], axis=1)
+    return NavigationErrors(t, error, np.sqrt(np.diagonal(P, axis1=1, axis2=2)), white)
 
 
 def _nav_velocities(nav: pd.DataFrame, times: Array) -> Array:

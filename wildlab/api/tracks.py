@@ -17,6 +17,7 @@ from wildlab.analysis.georeference import (
     georeference,
 )
 from wildlab.analysis.navigate import (
+    BLOCKS,
     REFERENCES,
     MekfTuning,
     Navigated,
@@ -32,15 +33,21 @@ from wildlab.analysis.tracks import tracker
 from wildlab.analysis.tracks.pixels import FILTERS, CvTuning, read_pixels, track_schmidt
 from wildlab.analysis.tracks.single_target import SMOOTHED, TOGETHER, SensorTrack
 from wildlab.analysis.tracks.tracker import (
-    FEW_INDEPENDENT,
     WHITE,
     TrackingResult,
+    nis_worth,
     seen_of,
     verdict,
-    worth_of_errors,
 )
 from wildlab.errors import WildlabError
-from wildlab.evaluation.consistency import Average, Series, mean_of_runs, nees, position_nees
+from wildlab.evaluation.consistency import (
+    Average,
+    Series,
+    mean_of_runs,
+    position_nees,
+    whiten,
+    worth_of_errors,
+)
 from wildlab.evaluation.errors import summarise_track, track_errors
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.files import check_model
@@ -182,6 +189,8 @@ class Tracked(Brief):
         (N, m) in the unit of the detections; NaN where none was used.
     nees, nis
         (N,) of the position, and of the detections.
+    nis_worth
+        How many independent values of NIS there are, as far as their mean goes.
     dof
         Elements of a detection, on average: what the mean NIS should be.
     given
@@ -202,6 +211,7 @@ class Tracked(Brief):
     innovation: Array
     nees: Array
     nis: Array
+    nis_worth: float
     dof: float
     given: tuple[tuple[str, str], ...]
 
@@ -339,7 +349,7 @@ def _as_followed(flight: Flight, found: TrackingResult, one: SensorTrack, source
     return Tracked(
         flight.name, one.sensor, one.target, one.filter, one.times, one.estimate, one.covariance, one.error,
         one.detection != "", seen_of(one), _places(flight, found, one, source), one.innovation, one.nees,
-        one.nis, one.dof, tuple(given),
+        one.nis, nis_worth(one), one.dof, tuple(given),
     )  # fmt: skip
 
 
@@ -390,8 +400,8 @@ def _as_tuned(
     sensor, called = (str(pixels[column].iloc[0]) for column in ("source", "target_id"))
     return Tracked(
         flight.name, sensor, called, filter, seen.times, found.x[:, :4], found.P[:, :4, :4], error,
-        seen.detected, np.ones(len(seen.times), bool), seen.positions, found.innovation, nees, found.nis, 2.0,
-        given,
+        seen.detected, np.ones(len(seen.times), bool), seen.positions, found.innovation, nees, found.nis,
+        worth_of_errors(whiten(found.innovation, found.S)), 2.0, given,
     )  # fmt: skip
 
 
@@ -420,12 +430,10 @@ class Consistency(Brief):
         """A row for each mean."""
         rows = []
         for name, a in self.means.items():
-            word = verdict(a)
-            if not a.inside and a.worth < FEW_INDEPENDENT:
-                word += ", but on few independent values"
             count = f"{a.n}, worth {a.worth:.0f}"
-            dof = f"{self.series[name][0].dof:.3g}"
-            rows.append((name, f"{a.mean:.2f}", dof, f"{a.low:.2f} to {a.high:.2f}", count, word))
+            rows.append(
+                (name, f"{a.mean:.2f}", f"{a.dof:.3g}", f"{a.low:.2f} to {a.high:.2f}", count, verdict(a))
+            )
         head = ("mean of", "is", "should be", "95 % interval", "values", "so the filter is")
         return Summary("Consistency", rows, head)
 
@@ -439,8 +447,8 @@ def consistency(
     NIS of its detections (as many as they have elements). Of a navigation: the NEES of position, velocity and
     attitude (three each) in that part of the flight which counts. Values of one run are correlated, so each
     run counts as what its values are worth, an error that lasts as one. That is an estimate from the same
-    values: where it is below `FEW_INDEPENDENT`, an honest filter's mean falls outside of the interval not in
-    5 % of cases but in 10 to 30 %, and the verdict says so. More runs help.
+    errors: an honest filter's mean falls outside of the interval in 2 to 9 % of cases. Where the interval
+    would also hold half or twice what the mean should be, being inside decides nothing. More runs help.
 
     Parameters
     ----------
@@ -478,10 +486,7 @@ def consistency(
                 field="covariances",
             )
         runs = zip(e.reshape(-1, *e.shape[-2:]), P.reshape(-1, *P.shape[-3:]), strict=True)
-        found = [
-            Series("NEES", e.shape[-1], np.arange(float(len(one))), nees(one, its), worth_of_errors(one, its))
-            for one, its in runs
-        ]
+        found = [_series_of("NEES", np.arange(float(e.shape[-2])), whiten(one, its)) for one, its in runs]
         known = [one for one in found if np.isfinite(one.values).any()]
         gathered = {"NEES": known} if known else {}
     elif (errors is None) != (covariances is None):
@@ -511,9 +516,16 @@ def navigation_series(errors: NavigationErrors, begin: float, end: float) -> lis
 
     Those blocks that have values; of a reference that is the truth, else two estimates' difference is scored.
     """
-    part = (errors.times >= begin) & (errors.times < end)
-    blocks = [Series(f"NEES {name}", 3, errors.times[part], nees[part]) for name, nees in errors.nees.items()]
+    during = (errors.times >= begin) & (errors.times < end)
+    blocks = [
+        _series_of(f"NEES {name}", errors.times[during], errors.white[during, part])
+        for name, part in BLOCKS.items()
+    ]
     return [one for one in blocks if np.isfinite(one.values).any()]
+
+
+def _series_of(name: str, times: Array, white: Array) -> Series:
+    return Series(name, white.shape[1], times, (white**2).sum(axis=1), worth_of_errors(white))
 
 
 def _series(one: Tracked | Navigation) -> list[Series]:
@@ -521,9 +533,9 @@ def _series(one: Tracked | Navigation) -> list[Series]:
         scored = one.errors is not None and one.reference == REFERENCES[0]
         return navigation_series(one.errors, *one.part[1:]) if one.errors is not None and scored else []
     rows = one.judged
-    worth = worth_of_errors(one.error[rows, :2], one.covariance[rows, :2, :2])
+    worth = worth_of_errors(whiten(one.error[rows, :2], one.covariance[rows, :2, :2]))
     both = [
         Series("NEES position", 2, one.times, np.where(rows, one.nees, np.nan), worth),
-        Series("NIS", one.dof, one.times, one.nis),
+        Series("NIS", one.dof, one.times, one.nis, one.nis_worth),
     ]
     return [each for each in both if np.isfinite(each.values).any()]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -191,7 +191,7 @@ def nis(innovations: ArrayLike, covariances: ArrayLike) -> Array:
 class Average(NamedTuple):
     """Mean of NEES or NIS (ANEES, ANIS; not divided by the degrees of freedom) beside its 95 % interval.
 
-    ``n``: values it is of. ``worth``: how many independent ones they are worth.
+    ``n``: values it is of. ``worth``: how many independent ones they are worth. ``dof``: what it should be.
     """
 
     mean: float
@@ -199,11 +199,17 @@ class Average(NamedTuple):
     high: float
     n: int
     worth: float
+    dof: float
 
     @property
     def inside(self) -> bool:
         """Whether the mean is what a consistent filter's would be."""
         return bool(self.low <= self.mean <= self.high)
+
+    @property
+    def telling(self) -> bool:
+        """Whether means of half and of twice what it should be would be outside."""
+        return bool(self.low >= self.dof / 2 and self.high <= self.dof * 2)
 
 
 def average(values: ArrayLike, dof: float, worth: float | None = None) -> Average:
@@ -234,7 +240,7 @@ def average(values: ArrayLike, dof: float, worth: float | None = None) -> Averag
     n = len(known)
     runs = max(1.0, float(n if worth is None or not np.isfinite(worth) else min(worth, n)))
     low, high = chi_square_interval(dof, runs=runs)
-    return Average(float(known.mean()) if n else float("nan"), low, high, n, runs if n else 0.0)
+    return Average(float(known.mean()) if n else float("nan"), low, high, n, runs if n else 0.0, dof)
 
 
 def share_inside(values: ArrayLike, interval: tuple[float, float]) -> float:
@@ -441,15 +447,77 @@ def portmanteau(series: ArrayLike, lags: int) -> tuple[float, float]:
 class Series(NamedTuple):
     """NEES or NIS (N,) of one run over its times (N,), s, with ``dof`` degrees of freedom; NaN: none.
 
-    ``worth``: at most so many independent values, where the errors themselves say so: one that lasts is one,
-    however much its square wavers.
+    ``worth``: how many independent values they are worth (`worth_of_errors`).
     """
 
     name: str
     dof: float
     times: Array
     values: Array
-    worth: float = np.inf
+    worth: float
+
+
+#: What errors are taken for: white noise and a first-order process, which has one of these shares of the
+#: variance, and one of so many time constants, from a sample to four times the series.
+LASTING, TIME_CONSTANTS = np.array([0.0, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9, 1.0]), 12
+#: Frequencies are taken together, the higher the more of them, in about so many bands.
+BANDS = 60
+
+
+def worth_of_errors(errors: ArrayLike) -> float:
+    """How many independent values the NEES or NIS of errors are worth for their mean.
+
+    Squares go together as the squares of the autocorrelations of errors do, about zero and not about their
+    mean: an error that is the same throughout is one. The sum of these squares is taken up to the first
+    autocorrelation that is not positive, and no smaller than expected of white noise and a first-order
+    process in sum: what lasts beneath noise is hardly seen at any one lag. Shares and time constants count
+    by the likelihood of the periodogram.
+
+    Parameters
+    ----------
+    errors
+        (N, m) errors or innovations in the order of time, in units of their own standard deviations
+        (`whiten`) or a multiple of these; rows with NaN are left out.
+
+    Returns
+    -------
+    float
+        From 1 to N, or 0 where there is none.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> round(worth_of_errors(rng.standard_normal((1000, 2))), -2), worth_of_errors(np.ones((1000, 2)))
+    (1000.0, 1.0)
+    """
+    x = np.asarray(errors, float)
+    x = x[np.isfinite(x).all(axis=1)]
+    n, m = x.shape
+    if n < 4 or not x.any():
+        return float(n)
+    power = (np.abs(np.fft.rfft(x, 2 * n, axis=0)) ** 2).sum(axis=1)
+    products, lag = np.fft.irfft(power), np.arange(n // 2 + 1)
+    r = (products[lag] / products[0] * n / (n - lag))[1:]
+    seen = 1 + 2 * float(np.cumprod(r > 0) @ r**2)
+
+    power, often = power[::2], np.full(n // 2 + 1, 2.0)
+    often[0], often[-1] = 1.0, 1.0 + n % 2
+    band = np.unique(np.append(0, np.geomspace(1, n // 2, BANDS).astype(int)))
+    count = np.add.reduceat(often, band)
+    level = np.add.reduceat(often * power, band) / count
+    angle = np.add.reduceat(often * lag, band) / count * 2 * np.pi / n
+    share = LASTING[:, None, None]
+    rho = np.exp(-1 / np.geomspace(0.7, 4 * n, TIME_CONSTANTS))[:, None]
+
+    def tapered_sum(z: NDArray[Any], last: Array) -> Array:
+        """Of ``(1 - |k| / n) z^|k|`` over all lags k, with ``last = z^n``: the expected periodogram."""
+        return np.asarray(2 * (1 / (1 - z) - z * (1 - last) / (n * (1 - z) ** 2)).real - 1)
+
+    spectrum = 1 - share + share * tapered_sum(rho * np.exp(1j * angle), rho**n)
+    likelihood = -m / 2 * (np.log(spectrum) @ count + n * np.log((level / spectrum) @ count))
+    chance = np.exp(likelihood - likelihood.max())
+    inflation = 1 + share[..., 0] ** 2 * (tapered_sum(rho**2, rho ** (2 * n))[:, 0] - 1)
+    return float(np.clip(n / max(seen, float((chance * inflation).sum() / chance.sum())), 1.0, n))
 
 
 def worth(values: ArrayLike) -> float:
@@ -501,7 +569,7 @@ def mean_of_runs(runs: Sequence[Series]) -> Average:
 
     Examples
     --------
-    >>> run = Series("NEES", 2, np.arange(3.0), np.array([1.0, 2.0, 3.0]))
+    >>> run = Series("NEES", 2, np.arange(3.0), np.array([1.0, 2.0, 3.0]), 3.0)
     >>> mean = mean_of_runs([run, run])
     >>> mean.mean, mean.n, mean.worth, mean.inside
     (2.0, 6, 6.0, True)
@@ -509,4 +577,4 @@ def mean_of_runs(runs: Sequence[Series]) -> Average:
     values = np.concatenate([np.asarray(run.values, float) for run in runs])
     known = np.array([np.isfinite(run.values).sum() for run in runs])
     dof = float(np.average([run.dof for run in runs], weights=known)) if known.any() else runs[0].dof
-    return average(values, dof, sum(min(worth(run.values), run.worth) for run in runs))
+    return average(values, dof, sum(run.worth for run in runs))

@@ -297,7 +297,7 @@ def block_mean(values: ArrayLike, blocks: ArrayLike, probability: float = PROBAB
     return Interval(mean, mean - half, mean + half)
 
 
-def independent_blocks(values: ArrayLike, blocks: ArrayLike) -> float:
+def independent_blocks(values: ArrayLike, blocks: ArrayLike, surely: float = 0.0) -> float:
     """How many independent blocks the mean of values is worth, three at least.
 
     Errors that wander make neighbouring blocks alike. Their correlation is that of a process of the first
@@ -309,6 +309,9 @@ def independent_blocks(values: ArrayLike, blocks: ArrayLike) -> float:
         (N,) without NaN.
     blocks
         (N,) which block each belongs to, in time order; two at least.
+    surely
+        Of its correlation, by so many standard errors more than estimated: 1.64 gives a number that is
+        exceeded with 95 %.
 
     Returns
     -------
@@ -320,7 +323,7 @@ def independent_blocks(values: ArrayLike, blocks: ArrayLike) -> float:
     >>> round(independent_blocks(wave, np.arange(20)), 1)
     3.0
     """
-    return independent_count(_apart(values, blocks)[0])
+    return independent_count(_apart(values, blocks)[0], surely)
 
 
 def widening(values: ArrayLike, blocks: ArrayLike, probability: float = PROBABILITY) -> float:

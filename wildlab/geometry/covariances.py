@@ -234,7 +234,7 @@ def check_covariance(P: Array, field: str) -> None:
 FEWEST_WORTH = 3.0
 
 
-def independent_count(apart: ArrayLike) -> float:
+def independent_count(apart: ArrayLike, surely: float = 0.0) -> float:
     """How many independent values a series is worth, three at least.
 
     Neighbours are as alike as in a process of the first order; the estimate of their correlation is freed of
@@ -244,6 +244,8 @@ def independent_count(apart: ArrayLike) -> float:
     ----------
     apart
         (N,) in time order, each less the mean of all.
+    surely
+        By so many of its standard errors the correlation is taken for larger than its estimate.
 
     Returns
     -------
@@ -257,7 +259,9 @@ def independent_count(apart: ArrayLike) -> float:
     a = np.asarray(apart, float)
     square, count = float(a @ a), len(a)
     alike = float(a[1:] @ a[:-1]) / square if square > 0 else 0.0
-    alike = float(np.clip(alike + (1 + 3 * alike) / count, 0.0, 0.9))
+    alike += (1 + 3 * alike) / count
+    alike += surely * float(np.sqrt(max(1 - alike**2, 0.0) / count))
+    alike = float(np.clip(alike, 0.0, 0.9))
     return max(count * (1 - alike) / (1 + alike), min(FEWEST_WORTH, count))
 
 

@@ -13,7 +13,6 @@ import pandas as pd
 
 from wildlab.analysis.tracks.ground_positions import counts_twice, platform_errors
 from wildlab.analysis.tracks.many import ManyTracks
-from wildlab.analysis.tracks.tracker import FEWEST
 from wildlab.evaluation.identities import Identities
 from wildlab.messages.catalogue import Message, load_texts
 from wildlab.messages.quantities import length, percent_of
@@ -26,6 +25,8 @@ from wildlab.tracking.multitarget_tracks import Count, count_interval, count_pro
 #: A target is tracked well where it has a track at this share of the scans at which it can be seen; below
 #: half it is lost.
 FOLLOWED, HALF = 0.9, 0.5
+#: A track that was compared with its target at fewer scans is not judged.
+FEWEST = 5
 #: Of so many standard deviations hardly any honest error is larger.
 WITHIN_SDS = 3.0
 #: Mean NEES of a position, divided by two: between these a track is as far off as it predicts, to a factor of

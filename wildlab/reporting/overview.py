@@ -417,7 +417,8 @@ def _show_figures(wording: Wording, overview: Overview) -> None:
     clock = charts.Clock(begin, overview.length_s)
     report, path, coverage = wording.report, overview.path, overview.coverage
     if path is not None:
-        wording.figure("path", charts.path_chart(path, overview.troubles), main=True)
+        key = ("path", "path-trouble", "path-troubles")[min(len(overview.troubles), 2)]
+        wording.figure(key, charts.path_chart(path, overview.troubles), "path", main=True)
     if coverage is not None and coverage.placed.any():
         report.section("Where it flew, and what it saw")
         wording.figure("coverage", charts.coverage_chart(coverage, path))

@@ -16,8 +16,6 @@ from wildlab.analysis.tracks.single_target import TOGETHER
 from wildlab.analysis.tracks.tracker import (
     CAUTIOUS,
     CONSISTENT,
-    FEW_INDEPENDENT,
-    FEWEST,
     LEADING,
     OVERCONFIDENT,
     UNKNOWN,
@@ -39,8 +37,6 @@ from wildlab.reporting.report import Report, Wording
 
 #: A target tracked by all sensors together may be this many times as far off as by the best one alone.
 ALIKE = 1.2
-#: A mean outside of its band by less than this factor may be so by chance, where few values are independent.
-NEAR_THE_BAND = 1.5
 _RECORDED = (
     # metric, column, unit, low, high, n
     ("rmse", "rmse", "m", None, None, "compared"),
@@ -100,23 +96,12 @@ def record_restarts(report: Report, rows: pd.DataFrame) -> None:
 # -- what follows from it
 
 
-def on_few(row: pd.Series, what: str = "nees") -> bool:
-    """Whether a verdict stands on so few independent values that it may be by chance."""
-    if not row[what] > 0:
-        return False
-    if row["verdict" if what == "nees" else "nis_verdict"] == CONSISTENT:
-        return bool(row[f"{what}_worth"] < FEWEST)
-    outside = max(row[what] / row[f"{what}_high"], row[f"{what}_low"] / row[what])
-    # The band is too narrow where its width is a guess; what is far outside is outside all the same.
-    return bool(row[f"{what}_worth"] < FEW_INDEPENDENT and 1 < outside < NEAR_THE_BAND)
-
-
 def surprised(rows: pd.DataFrame) -> pd.DataFrame:
     """Tracks whose detections are not where they expect them, whatever their errors: the mean NIS is above
     its band, and by so much that it matters."""
     beyond = np.sqrt(rows["nis"] / rows["dof"]) > CLEAR
     beyond &= rows["nis_verdict"] == OVERCONFIDENT
-    return rows[beyond & ~rows.apply(on_few, axis=1, what="nis")]
+    return rows[beyond]
 
 
 def split_together(known: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
@@ -183,7 +168,7 @@ def judge_tracks(rows: pd.DataFrame, pairs: Sequence[SensorPair], problems: int 
         against = int(mine["verdict"].isin([OVERCONFIDENT, CAUTIOUS]).sum())
         troubled = against + len(surprised(mine)) + (worse_together(rows) is not None)
         # Of tracks that mostly could not be judged a consistent one says little.
-        sound = (mine["verdict"] == CONSISTENT).mean() > 0.5 and not mine.apply(on_few, axis=1).any()
+        sound = (mine["verdict"] == CONSISTENT).mean() > 0.5
         return verdict_of(Evidence(troubled=troubled, judged=int(sound)))
     used = [one for one in pairs if one.filter == leading_filter(mine)]
     agree = all(verdict(one.squares) == CONSISTENT for one in used)
@@ -222,13 +207,10 @@ def answer(rows: pd.DataFrame, pairs: Sequence[SensorPair]) -> list[Message]:
         **{key: str(int((mine[column] == word).sum())) for key, word in _COUNTED.items()},
     }
     found = set(judged[column])
-    few = bool(shown.apply(on_few, axis=1, what=what).any())
-    if not found or (few and found == {CONSISTENT}):
+    if not found:
         kind = "unknown"
     elif len(found) > 1 or 2 * len(judged) <= len(mine):
         kind = "mixed"
-    elif few:
-        kind = "doubtful"
     else:
         kind = next(key for key, word in _COUNTED.items() if word in found)
     first = Message(f"{'errors' if with_truth else 'innovations'}-{kind}", values)
@@ -283,13 +265,12 @@ def reason(rows: pd.DataFrame, problems: int = 0) -> Message:
     mine = leading_rows(rows)
     column = "verdict" if (rows["compared"] > 0).any() else "nis_verdict"
     what = "nees" if column == "verdict" else "nis"
-    few = bool(mine.apply(on_few, axis=1, what=what).any())
     counts = ", ".join(
         f"{word} ({count})"
         for word in (CONSISTENT, OVERCONFIDENT, CAUTIOUS, UNKNOWN)
         if (count := int((mine[column] == word).sum()))
     )
-    return Message(f"reason-{what}{'-few' if few else ''}", {"counts": counts})
+    return Message(f"reason-{what}", {"counts": counts})
 
 
 # -- tables
@@ -322,19 +303,16 @@ def tracks_table(rows: pd.DataFrame) -> pd.DataFrame:
             return NOTHING
         return f"{row[what]:.2f} ({row[f'{what}_low']:.2f} to {row[f'{what}_high']:.2f})"
 
-    def verdict_on(row: pd.Series, what: str) -> str:
-        return str(row["verdict" if what == "nees" else "nis_verdict"]) + ("*" if on_few(row, what) else "")
-
     shown = []
     for _, row in rows.iterrows():
         one = {
             "track": f"{row['target']}, {row['sensor']}",
             "filter": filter_words(row["filter"]),
-            "nis_verdict": verdict_on(row, "nis"),
+            "nis_verdict": row["nis_verdict"],
         }
         if truth:
             one |= {
-                "verdict": verdict_on(row, "nees"),
+                "verdict": row["verdict"],
                 "compared": row["compared"],
                 "rmse": row["rmse"],
                 "rmse_without": row["rmse_without"],

@@ -48,10 +48,12 @@ from wildlab.messages.catalogue import (
 from wildlab.messages.quantities import nice_length
 from wildlab.reporting.front_page import OwnFlight
 from wildlab.reporting.text import POLICY, mark_up, read_style, render
-from wildlab.reporting.tracking import NEAR_THE_BAND, band_name
+from wildlab.reporting.tracking import band_name
 from wildlab.sharing.tiers import Cell
 
 NAN = math.nan
+#: Errors of tracks that exceed those predicted by no more than this need no warning.
+NEAR_THE_BAND = 1.5
 #: What moves so far, and so far above the ground, flies: no mast of a boat or a car is as high, m.
 FLYING = 30.0
 _TROUBLES = dict(

@@ -14,8 +14,7 @@ from wildlab.flight.manifest import parse_settings
 from wildlab.reporting import tracking
 from wildlab.reporting.metrics import read_metrics
 from wildlab.reporting.report import open_report
-from wildlab.reporting.tracking import NEAR_THE_BAND
-from wildlab.sharing.edition import facts_of
+from wildlab.sharing.edition import NEAR_THE_BAND, facts_of
 
 ERROR = {
     ("horizontal_error_median", "logged-pose"): {"value": 3.0, "n": 40},

@@ -20,9 +20,9 @@ from wildlab.evaluation.consistency import (
     autocorrelation,
     average,
     chi_square_interval,
-    position_nees,
     share_inside,
-    worth,
+    whiten,
+    worth_of_errors,
 )
 from wildlab.evaluation.errors import summarise_track, track_errors
 from wildlab.flight.clocks import frame_times, truth_at
@@ -332,7 +332,8 @@ def evaluate_track(
     """
     state = track.x[:, :4]
     errors = track_errors(seen.truth, state)
-    values = position_nees(seen.truth - state, track.P[:, :4, :4])
+    white = whiten(errors.position, track.P[:, :2, :2])
+    values = (white**2).sum(axis=1)
     summary = summarise_track(errors)
     bounds = chi_square_interval(2)
     numbers = {
@@ -348,7 +349,7 @@ def evaluate_track(
     }
     distance = np.hypot(*(seen.truth - state)[:, :2].T)
     known, measured = np.flatnonzero(np.isfinite(values)), np.isfinite(distance) & seen.detected
-    band = average(values, 2, worth(values[known]))
+    band = average(values, 2, worth_of_errors(white))
     numbers |= {
         "error_at_end": float(distance[known[-1]]) if len(known) else math.nan,
         "p95_measured": float(np.quantile(distance[measured], 0.95)) if measured.any() else math.nan,

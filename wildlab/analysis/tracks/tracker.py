@@ -48,10 +48,10 @@ from wildlab.evaluation.consistency import (
     autocorrelation,
     average,
     chi_square_interval,
-    nees,
     share_inside,
     whiten,
     worth,
+    worth_of_errors,
 )
 from wildlab.evaluation.errors import summarise_track, track_errors
 from wildlab.evaluation.intervals import share_interval
@@ -433,45 +433,19 @@ def refuse_unusable(
     _refuse_unknown(targets, known, flight)
 
 
-#: Fewer independent values than this, estimated from the values themselves, make an interval too narrow.
-FEW_INDEPENDENT = 30.0
-#: Of fewer independent values than this nothing is judged: nearly any filter would pass.
-FEWEST = 5
 #: The metric whose subject is the filter that a page speaks of.
 LEADING = "leading_filter"
 CONSISTENT, OVERCONFIDENT, CAUTIOUS, UNKNOWN = "consistent", "overconfident", "too cautious", "not judged"
 
 
 def verdict(mean: Average) -> str:
-    """Whether a filter is consistent, by the 95 % band of its mean NEES or NIS; few scans are not judged."""
-    if mean.n < FEWEST_SCANS:
+    """Whether a filter is consistent, by the 95 % band of its mean NEES or NIS.
+
+    Few scans are not judged, nor is a mean inside of a band so wide that nearly any filter would pass.
+    """
+    if mean.n < FEWEST_SCANS or (mean.inside and not mean.telling):
         return UNKNOWN
     return CONSISTENT if mean.inside else OVERCONFIDENT if mean.mean > mean.high else CAUTIOUS
-
-
-def mean_of(values: Array, dof: float) -> Average:
-    """The mean with the band for as many independent values as there are."""
-    return average(values, dof, worth(values))
-
-
-def worth_of_errors(errors: Array, covariances: Array) -> float:
-    """How many independent errors (N, 2) with their covariances there are.
-
-    Of errors in units of their own standard deviation, about zero and not about their mean: an error that is
-    the same throughout is one, however steady its square is.
-    """
-    white = whiten(errors, covariances)
-    white = white[np.isfinite(white).all(axis=1)]
-    n = len(white)
-    if n < 4:
-        return float(n)
-    padded = np.fft.rfft(white, 2 * n, axis=0)
-    products = np.fft.irfft(np.abs(padded) ** 2, axis=0)[:n].sum(axis=1)
-    r = products[1:] / products[0] * n / (n - np.arange(1, n))
-    stop = np.flatnonzero(r[: n // 2] <= 0)
-    r = r[: stop[0]] if len(stop) else r[: n // 2]
-    # Of squares, whose correlation is the square of that of the errors.
-    return float(max(1.0, n / (1 + 2 * float(np.sum(r**2)))))
 
 
 def score_tracks(followed: TrackingResult) -> pd.DataFrame:
@@ -491,7 +465,7 @@ def score_tracks(followed: TrackingResult) -> pd.DataFrame:
 
 
 def leading_filter(rows: pd.DataFrame) -> str:
-    """The filter that is spoken of: of those with most consistent tracks the one of least error.
+    """The filter that is spoken of: of those with most tracks that nothing speaks against, the one nearest.
 
     Parameters
     ----------
@@ -511,13 +485,14 @@ def leading_filter(rows: pd.DataFrame) -> str:
     # Beside the best filter on the same target: filters need not have the same tracks.
     least = off.groupby([alone["sensor"], alone["target"]]).transform("min")
     of = alone["filter"]
-    consistent = (alone["verdict" if truth else "nis_verdict"] == CONSISTENT).groupby(of).sum()
+    known, against = alone["nees" if truth else "nis"].notna(), alone["verdict" if truth else "nis_verdict"]
+    sound = (known & ~against.isin([OVERCONFIDENT, CAUTIOUS])).groupby(of).sum()
     worse = (off - least if not truth else off / least).groupby(of).median().fillna(np.inf)
 
     def order(name: str) -> tuple[int, bool, float, bool]:
         # Innovations do not show an error that lasts: without truth the white filter comes after its equals.
         white = name == "ekf"
-        return -consistent[name], white and not truth and consistent[name] > 0, worse[name], white
+        return -sound[name], white and not truth and sound[name] > 0, worse[name], white
 
     return str(min(dict.fromkeys(of), key=order))
 
@@ -533,16 +508,14 @@ def score_track(one: SensorTrack, kind: str) -> dict[str, object]:
     summary = summarise_track(track_errors((one.estimate + one.error)[seen], one.estimate[seen]))
     away = np.hypot(*one.error[~seen, :2].T)
     away = away[np.isfinite(away)]
-    m, squares = one.dof, one.nees[seen]
-    of_nees, of_nis = mean_of(squares, 2), mean_of(one.nis, m)
-    if of_nees.n:
-        independent = worth_of_errors(one.error[seen, :2], one.covariance[seen, :2, :2])
-        of_nees = average(squares, 2, min(of_nees.worth, independent))
+    m, squares, white = one.dof, one.nees[seen], whitened(one)
+    off = whiten(one.error[seen, :2], one.covariance[seen, :2, :2])
+    of_nees = average(squares, 2, worth_of_errors(off))
+    of_nis = average(one.nis, m, nis_worth(one))
     inside = share_inside(squares, chi_square_interval(2))
     band = (np.nan, np.nan)
     if of_nees.n and of_nees.worth >= 1:
         band = share_interval(inside * of_nees.worth, of_nees.worth)[1:]
-    white = whitened(one)
     lags = [float(autocorrelation(column, 1)[1]) for column in white.T] if len(white) > 3 else []
     return {
         "sensor": one.sensor,
@@ -599,6 +572,11 @@ def whitened(one: SensorTrack) -> Array:
     return np.asarray(whiten(one.innovation[used], one.S[used])) if used.any() else one.innovation[used]
 
 
+def nis_worth(one: SensorTrack) -> float:
+    """How many independent values the NIS of a track are worth."""
+    return worth(one.nis) if len(one.sizes) else worth_of_errors(whitened(one))
+
+
 class SensorPair(NamedTuple):
     """Two sensors' tracks of one target by one filter: how far apart, and how far they say they may be.
 
@@ -630,12 +608,10 @@ def compare_sensors(followed: TrackingResult) -> list[SensorPair]:
             both = np.isfinite(gap).all(axis=1)
             if not both.any():
                 continue
-            squares = np.full(len(gap), np.nan)
-            squares[both] = nees(gap[both], (a.covariance[:, :2, :2] + P)[both])
+            off = whiten(gap[both], (a.covariance[:, :2, :2] + P)[both])
+            squares = average((off**2).sum(axis=1), 2, worth_of_errors(off))
             rms = float(np.sqrt(np.mean(np.sum(gap[both] ** 2, axis=1))))
-            found.append(
-                SensorPair(target, name, a.sensor, b.sensor, rms, int(both.sum()), mean_of(squares, 2))
-            )
+            found.append(SensorPair(target, name, a.sensor, b.sensor, rms, int(both.sum()), squares))
     return found
 
 
