@@ -10,7 +10,6 @@ from wildlab.evaluation.consistency import (
     average,
     chi_square_interval,
     nees,
-    nis,
     position_nees,
     share_inside,
     simulate_filter_runs,
@@ -34,7 +33,7 @@ def test_nees_is_its_definition():
     e = rng.standard_normal((50, 4))
     expected = [row @ np.linalg.inv(matrix) @ row for row, matrix in zip(e, P, strict=True)]
     np.testing.assert_allclose(nees(e, P), expected, rtol=1e-9)
-    np.testing.assert_allclose(nis(e, P[0]), [row @ np.linalg.inv(P[0]) @ row for row in e], rtol=1e-9)
+    np.testing.assert_allclose(nees(e, P[0]), [row @ np.linalg.inv(P[0]) @ row for row in e], rtol=1e-9)
 
 
 def test_moments_without_truth_stay_in_their_row():

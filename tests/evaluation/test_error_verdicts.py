@@ -33,7 +33,7 @@ def test_the_interval_of_the_factor_holds_what_it_says():
     P = np.tile(4.0 * np.eye(2), (240, 1, 1))
     inside = wrong = 0
     for seed in range(100):
-        found = judge_ellipses(normal(seed), P, BLOCKS, np.random.default_rng(seed), draws=200)
+        found = judge_ellipses(normal(seed), P, BLOCKS, np.random.default_rng(seed))
         inside += found.factor.low <= 1.0 <= found.factor.high
         wrong += found.word in ("too small", "too large")
     assert 0.78 < inside / 100 < 0.98
@@ -49,7 +49,7 @@ def test_few_honest_ellipses_are_rarely_called_dishonest(images, points):
     for seed in range(100):
         rng = np.random.default_rng(seed)
         errors = np.sqrt(0.5) * (rng.normal(size=(images, 2))[image] + rng.normal(size=(len(image), 2)))
-        found = judge_ellipses(errors, P, time_blocks(image, seconds=False), rng, draws=50)
+        found = judge_ellipses(errors, P, time_blocks(image, seconds=False), rng)
         words.append(found.word)
         inside += found.factor.low <= 1.0 <= found.factor.high
     assert words.count("too large") <= 10 and words.count("too small") <= 10

@@ -22,7 +22,7 @@ def test_bootstrap_by_image_is_wider_than_by_click_and_covers():
         rng = np.random.default_rng(seed)
         image = np.repeat(np.arange(40), 10)
         errors = rng.normal(0, 1, (40, 2))[image] + [0.5, 0]
-        low, high = bootstrap_interval(lambda e: e[:, 0].mean(), errors, image, rng, draws=200)
+        low, high = bootstrap_interval(lambda e: e[:, 0].mean(), errors, image, rng)
         hits += low <= 0.5 <= high
     # 90 % intervals over 60 trials: fewer than 45 hits has a chance below one in a thousand.
     assert hits >= 45

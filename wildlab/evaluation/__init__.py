@@ -5,7 +5,7 @@ them are (N, n), their covariances (N, n, n) or (n, n) for all, and a row of NaN
 NEES and NIS are not divided by their degrees of freedom. H is H. H. Helgesen, Detection and Tracking of
 Floating Objects using UAVs with Optical Sensors, doctoral thesis, NTNU 2019.
 
-- `nees`, `nis`, `average`, `chi_square_interval`: is a filter consistent?
+- `nees`, `worth_of_errors`, `average`, `chi_square_interval`: is a filter consistent?
 - `innovation_whiteness`, `autocorrelation`, `worth`: are its innovations white?
 - `track_errors`, `summarise_track`: how far is a track from the truth?
 - `gospa`: how far is a set of tracks? `compare_identities`: who follows whom, how long, and how well.

@@ -24,7 +24,7 @@ from wildlab.evaluation.correlated_errors import (
     WanderNoise,
     fit_generalised,
 )
-from wildlab.evaluation.intervals import PROBABILITY, Interval, Labels, block_mean
+from wildlab.evaluation.intervals import Interval, Labels, block_mean
 from wildlab.evaluation.outliers import ODDS
 from wildlab.geometry.covariances import chi2_beyond
 
@@ -175,7 +175,7 @@ class Gain(NamedTuple):
         return bool(self.gain.low > 0)
 
 
-def gain_of(without: Array, with_: Array, blocks: Labels, probability: float = PROBABILITY) -> Gain:
+def gain_of(without: Array, with_: Array, blocks: Labels) -> Gain:
     """Gain of held-out errors (N, 2) over errors (N, 2) without the cause, by blocks (N,).
 
     Parameters
@@ -184,8 +184,6 @@ def gain_of(without: Array, with_: Array, blocks: Labels, probability: float = P
         (N, 2) m.
     blocks
         (N,).
-    probability
-        Of the interval.
 
     Returns
     -------
@@ -197,7 +195,7 @@ def gain_of(without: Array, with_: Array, blocks: Labels, probability: float = P
     if not both.any():
         nan = float("nan")
         return Gain(nan, nan, Interval(nan, nan, nan))
-    gain = block_mean(np.where(both, before - after, np.nan), blocks, probability)
+    gain = block_mean(np.where(both, before - after, np.nan), blocks)
     return Gain(float(before[both].mean()), float(after[both].mean()), gain)
 
 

@@ -17,16 +17,13 @@ Array = NDArray[np.float64]
 ERROR_CONVENTION = "truth minus estimate"
 
 
-def chi_square_interval(dof: float, probability: float = 0.95, runs: float = 1) -> tuple[float, float]:
-    """Two-sided interval in which NEES or NIS lies with ``probability`` if the filter is consistent (H
-    example 3.1).
+def chi_square_interval(dof: float, runs: float = 1) -> tuple[float, float]:
+    """Two-sided interval in which NEES or NIS lies with 95 % if the filter is consistent (H example 3.1).
 
     Parameters
     ----------
     dof
         Number of states (NEES) or of elements of a measurement (NIS); their mean where they vary.
-    probability
-        Of the whole interval; half of the rest lies on either side.
     runs
         Of how many independent runs the value is the mean; their sum has ``runs * dof`` degrees of freedom.
         For a mean over the time of one run: as many as its correlated values are worth, which need not be
@@ -39,7 +36,7 @@ def chi_square_interval(dof: float, probability: float = 0.95, runs: float = 1) 
     Raises
     ------
     WildlabError
-        If ``dof`` or ``runs`` is below 1, or ``probability`` not between 0 and 1.
+        If ``dof`` or ``runs`` is below 1.
 
     Examples
     --------
@@ -49,13 +46,11 @@ def chi_square_interval(dof: float, probability: float = 0.95, runs: float = 1) 
     >>> round(low, 2), round(high, 2)
     (3.46, 4.57)
     """
-    if dof < 1 or runs < 1 or not 0 < probability < 1:
+    if dof < 1 or runs < 1:
         raise WildlabError(
-            f"no interval for {dof} degrees of freedom, {runs} runs and probability {probability}",
-            "give at least one of each, and a probability between 0 and 1",
+            f"no interval for {dof} degrees of freedom and {runs} runs", "give at least one of each"
         )
-    tail = (1 - probability) / 2
-    return float(chi2_quantile(tail, dof * runs) / runs), float(chi2_quantile(1 - tail, dof * runs) / runs)
+    return chi2_quantile(0.025, dof * runs) / runs, chi2_quantile(0.975, dof * runs) / runs
 
 
 def whiten(errors: ArrayLike, covariances: ArrayLike) -> Array:
@@ -100,14 +95,14 @@ def whiten(errors: ArrayLike, covariances: ArrayLike) -> Array:
 
 
 def nees(errors: ArrayLike, covariances: ArrayLike, truth_covariance: ArrayLike | None = None) -> Array:
-    """Normalised estimation error squared, H (3.11): ``e' P^-1 e``, `ERROR_CONVENTION`.
+    """Normalised error squared, NEES of estimates and NIS of innovations: ``e' P^-1 e``, H (3.11), (3.12).
 
     Parameters
     ----------
     errors
-        (N, n), truth minus estimate. A row with NaN (no truth at that time) gives NaN.
+        (N, n), `ERROR_CONVENTION`; innovations with angles wrapped. A row with NaN gives NaN.
     covariances
-        (N, n, n) of the estimates, or (n, n) for all.
+        (N, n, n) of the estimates, or of the innovations; (n, n) for all.
     truth_covariance
         Likewise, of the errors of the truth itself, which are independent of the filter's: then the
         difference has the sum of both. Left out, the truth is taken for exact.
@@ -164,28 +159,6 @@ def position_nees(
     """
     e, P = np.asarray(errors, dtype=float), np.asarray(covariances, dtype=float)
     return nees(e[:, :2], P[..., :2, :2], truth_covariance)
-
-
-def nis(innovations: ArrayLike, covariances: ArrayLike) -> Array:
-    """Normalised innovation squared, H (3.12): ``v' S^-1 v``.
-
-    Parameters
-    ----------
-    innovations
-        (N, m), angles wrapped, in the measurement's units. A row with NaN (no measurement) gives NaN.
-    covariances
-        (N, m, m) of the innovations, ``S``, or (m, m) for all; in the units squared.
-
-    Returns
-    -------
-    (N,), m degrees of freedom.
-
-    Raises
-    ------
-    WildlabError
-        As `nees`.
-    """
-    return nees(innovations, covariances)
 
 
 class Average(NamedTuple):
@@ -270,15 +243,17 @@ class FilterRuns(NamedTuple):
     nis: Array
 
 
+#: Standard deviation of each coordinate that simulated runs measure, m.
+MEASURED_M = 2.0
+
+
 def simulate_filter_runs(
     rng: np.random.Generator,
     *,
     runs: int,
     steps: int,
     claimed_noise: float = 1.0,
-    interval_s: float = 1.0,
     acceleration_m_s2: float = 0.3,
-    measurement_m: float = 2.0,
 ) -> FilterRuns:
     """Runs of a linear Kalman filter on targets that move and are measured exactly as it assumes (H example
     3.1).
@@ -290,14 +265,14 @@ def simulate_filter_runs(
     claimed_noise
         Factor on the measurement noise that the filter believes in: 1 is the truth, 0.5 an overconfident
         filter.
-    acceleration_m_s2, measurement_m
-        Standard deviations of the process noise (constant over a step) and of each measured coordinate.
+    acceleration_m_s2
+        Standard deviation of the process noise, constant over a step of a second.
     """
-    F = np.kron(np.array([[1.0, interval_s], [0.0, 1.0]]), np.eye(2))
+    F = np.kron(np.array([[1.0, 1.0], [0.0, 1.0]]), np.eye(2))
     # The order of the state is north, east, velocity north, velocity east. Q has rank 2: one acceleration per
     # axis, which moves position and velocity together.
-    push = np.kron(np.array([[interval_s**2 / 2], [interval_s]]), np.eye(2)) * acceleration_m_s2
-    Q, H, R = push @ push.T, np.eye(2, 4), np.eye(2) * (measurement_m * claimed_noise) ** 2
+    push = np.kron(np.array([[0.5], [1.0]]), np.eye(2)) * acceleration_m_s2
+    Q, H, R = push @ push.T, np.eye(2, 4), np.eye(2) * (MEASURED_M * claimed_noise) ** 2
     P = np.diag([10.0, 10.0, 3.0, 3.0]) ** 2
     drawn = rng.standard_normal((runs, 4 + 4 * steps))
     truth = drawn[:, :4] * np.sqrt(np.diag(P))
@@ -309,12 +284,12 @@ def simulate_filter_runs(
         estimate, P = estimate @ F.T, F @ P @ F.T + Q
         S = H @ P @ H.T + R
         K = P @ H.T @ np.linalg.inv(S)
-        innovation = (truth - estimate) @ H.T + measurement_m * noises[:, step]
+        innovation = (truth - estimate) @ H.T + MEASURED_M * noises[:, step]
         kept = np.eye(4) - K @ H
         estimate, P = estimate + innovation @ K.T, kept @ P @ kept.T + K @ R @ K.T
-        values[0, :, step] = nees(truth - estimate, np.broadcast_to(P, (runs, 4, 4)))
-        values[1, :, step] = nis(innovation, np.broadcast_to(S, (runs, 2, 2)))
-    return FilterRuns(np.arange(1, steps + 1, dtype=np.float64) * interval_s, values[0], values[1])
+        values[0, :, step] = nees(truth - estimate, P)
+        values[1, :, step] = nees(innovation, S)
+    return FilterRuns(np.arange(1.0, steps + 1), values[0], values[1])
 
 
 def autocorrelation(series: ArrayLike, max_lag: int) -> Array:
@@ -342,21 +317,19 @@ def autocorrelation(series: ArrayLike, max_lag: int) -> Array:
         return np.asarray(products / products[0])
 
 
-def white_bound(n: int, level: float = 0.95) -> float:
-    """Magnitude that autocorrelations of white samples stay below with probability ``level``, each.
+def white_bound(n: int) -> float:
+    """Magnitude that autocorrelations of white samples stay below with 95 %, each.
 
     Parameters
     ----------
     n
         How many samples they are from; the bound holds where they are many.
-    level
-        Between 0 and 1.
 
     Returns
     -------
     float
     """
-    return float(normal_quantile((1 + level) / 2) / np.sqrt(n))
+    return float(normal_quantile(0.975) / np.sqrt(n))
 
 
 class Whiteness(NamedTuple):

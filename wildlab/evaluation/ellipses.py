@@ -31,6 +31,8 @@ CLOSE, CLEAR = 1.06, 1.15
 LONG = 2.0
 #: Honest is said only where the factor is also known to lie between these.
 WIDEST = (1 / 1.5, 1.5)
+#: Which share of the truth ellipses promise to hold, and how often blocks are drawn for the factor.
+STATED, DRAWS = 0.9, 500
 #: Mean of the logarithm of a chi-square with two degrees of freedom: log 2 less Euler's constant.
 _MEAN_LOG = float(np.log(2) - np.euler_gamma)
 #: Squared errors below this have no logarithm worth the name: a millionth of a standard deviation.
@@ -49,8 +51,6 @@ class EllipseVerdict(NamedTuple):
     factor
         What to multiply their axes by so that they hold it as often as they say, with its interval. Its high
         end is no lower than that of a factor which all errors tell, not the largest alone.
-    stated
-        How often they say they do.
     n
         How many there are.
     """
@@ -58,7 +58,6 @@ class EllipseVerdict(NamedTuple):
     word: Word
     coverage: Interval
     factor: Interval
-    stated: float
     n: int
 
 
@@ -67,10 +66,8 @@ def judge_ellipses(
     covariances: ArrayLike,
     blocks: ArrayLike,
     rng: np.random.Generator,
-    stated: float = 0.9,
-    draws: int = 500,
 ) -> EllipseVerdict:
-    """Hold the ellipses of errors against the errors.
+    """Hold the 90 % ellipses of errors against the errors.
 
     Parameters
     ----------
@@ -82,10 +79,6 @@ def judge_ellipses(
         (N,) which points are drawn together.
     rng
         Draws blocks with replacement, for the interval of the factor.
-    stated
-        Share of the truth that an ellipse promises to hold.
-    draws
-        How often.
 
     Returns
     -------
@@ -103,27 +96,27 @@ def judge_ellipses(
     keep = np.isfinite(e).all(axis=1) & np.isfinite(P).all(axis=(1, 2))
     nan = float("nan")
     if not keep.any():
-        return EllipseVerdict("too few", Interval(nan, nan, nan), Interval(nan, nan, nan), stated, 0)
+        return EllipseVerdict("too few", Interval(nan, nan, nan), Interval(nan, nan, nan), 0)
     e, P, group = e[keep], P[keep], np.unique(np.asarray(blocks)[keep], return_inverse=True)[1]
     squared = np.einsum("ni,ni->n", e, np.linalg.solve(P, e[..., None])[..., 0])
-    bound = chi2_quantile(stated, 2)
+    bound = chi2_quantile(STATED, 2)
     held = block_mean((squared <= bound).astype(float), group)
     # Student's interval does not know that a share ends at one.
     coverage = Interval(held.estimate, max(held.low, 0.0), min(held.high, 1.0))
-    size = float(np.sqrt(np.quantile(squared, stated) / bound))
+    size = float(np.sqrt(np.quantile(squared, STATED) / bound))
     count = int(group.max()) + 1
     if count < FEWEST:
-        return EllipseVerdict("too few", coverage, Interval(size, nan, nan), stated, len(e))
+        return EllipseVerdict("too few", coverage, Interval(size, nan, nan), len(e))
     members = [squared[group == g] for g in range(count)]
     drawn = [
-        np.quantile(np.concatenate([members[g] for g in rng.integers(0, count, count)]), stated)
-        for _ in range(draws)
+        np.quantile(np.concatenate([members[g] for g in rng.integers(0, count, count)]), STATED)
+        for _ in range(DRAWS)
     ]
     ends = np.sqrt(np.quantile(drawn, [(1 - PROBABILITY) / 2, (1 + PROBABILITY) / 2]) / bound)
     ends = size * (ends / size) ** widening(np.log(np.maximum(squared, _LEAST)), group)
     # No draw holds an error larger than was seen: six honest ellipses hold the truth all, half the time.
     factor = Interval(size, float(ends[0]), max(float(ends[1]), _largest_factor(squared, group)))
-    return EllipseVerdict(_word(factor), coverage, factor, stated, len(e))
+    return EllipseVerdict(_word(factor), coverage, factor, len(e))
 
 
 def _largest_factor(squared: Array, group: NDArray[np.intp]) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.evaluation.intervals import widening
+from wildlab.evaluation.intervals import PROBABILITY, widening
 from wildlab.geometry.frames import wrap
 
 Array = NDArray[np.float64]
@@ -64,13 +64,15 @@ def summarise(errors: ArrayLike) -> ErrorSummary:
     )
 
 
+#: How often images are drawn for an interval.
+DRAWS = 1000
+
+
 def bootstrap_interval(
     statistic: Callable[[Array], float],
     errors: ArrayLike,
     image: ArrayLike,
     rng: np.random.Generator,
-    draws: int = 1000,
-    level: float = 0.9,
 ) -> tuple[float, float]:
     """Interval for a statistic of errors, by drawing whole images again and again.
 
@@ -87,16 +89,12 @@ def bootstrap_interval(
         (N,) which image each belongs to. It may name anything that shares its error, a minute of a flight
         for instance.
     rng
-        What the images are drawn with.
-    draws
-        How often, at least once. Each draws as many images as there are, with replacement.
-    level
-        Share of the draws that the interval holds, between 0 and 1.
+        What the images are drawn with: `DRAWS` times as many as there are, with replacement.
 
     Returns
     -------
     low, high
-        Ends of the middle ``level`` of the draws, in the unit of the statistic, the further from its value
+        Ends of the middle 90 % of the draws, in the unit of the statistic, the further from its value
         the more alike images are that follow each other (`wildlab.evaluation.intervals.widening`); NaN where
         fewer than two images are left.
     """
@@ -107,11 +105,11 @@ def bootstrap_interval(
         return float("nan"), float("nan")
     members = [np.flatnonzero(group == g) for g in range(group.max() + 1)]
     values = []
-    for _ in range(draws):
+    for _ in range(DRAWS):
         picked = rng.integers(0, len(members), len(members))
         values.append(statistic(e[np.concatenate([members[g] for g in picked])]))
-    whole, wider = statistic(e), widening(np.hypot(*e.T), group, level)
-    low, high = whole + wider * (np.quantile(values, [(1 - level) / 2, (1 + level) / 2]) - whole)
+    whole, wider = statistic(e), widening(np.hypot(*e.T), group)
+    low, high = whole + wider * (np.quantile(values, [(1 - PROBABILITY) / 2, (1 + PROBABILITY) / 2]) - whole)
     return float(low), float(high)
 
 

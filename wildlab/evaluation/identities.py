@@ -166,12 +166,12 @@ class _Checked(NamedTuple):
     truth_sd: Array
 
 
-def compare_identities(scans: Sequence[Moment], cutoff: float, order: float = 2.0) -> Identities:
+def compare_identities(scans: Sequence[Moment], cutoff: float) -> Identities:
     """What became of tracks and targets over scans in the order of time.
 
     Who follows whom is settled with the memory of CLEAR MOT (Bernardin and Stiefelhagen 2008), for a moment's
     noise beside another target is no swap: GOSPA's assignment, in which the last pair of a track costs less
-    by half of the cut-off to the power ``order``. So two tracks that exchange their targets swap at the scan
+    by the square of half of the cut-off. So two tracks that exchange their targets swap at the scan
     at which these are half the cut-off apart, and never while they are nearer. CLEAR MOT keeps a pair up to
     the cut-off itself, also where the track is on another target by then, whose own track is left with what
     remains; GOSPA has no memory.
@@ -182,8 +182,6 @@ def compare_identities(scans: Sequence[Moment], cutoff: float, order: float = 2.
         Of confirmed tracks alone, times not falling.
     cutoff
         Distance from which a track does not follow a target, in the unit of the positions.
-    order
-        p of GOSPA.
 
     Returns
     -------
@@ -192,8 +190,7 @@ def compare_identities(scans: Sequence[Moment], cutoff: float, order: float = 2.
     Raises
     ------
     WildlabError
-        If there are no scans, their times fall, a scan's parts do not fit each other, a name or identity is
-        there twice, or as `gospa`.
+        If there are no scans, or their times fall, or as `gospa`.
 
     Examples
     --------
@@ -215,7 +212,7 @@ def compare_identities(scans: Sequence[Moment], cutoff: float, order: float = 2.
     pairs: list[Pairs] = []
     before: dict[Hashable, Hashable] = {}
     for one in given:
-        found = _follow(one, before, cutoff, order)
+        found = _follow(one, before, cutoff)
         pairs.append(found)
         before |= {one.identities[row]: one.names[column] for row, column in found}
     swaps, breaks = _changes(given, pairs)
@@ -225,7 +222,7 @@ def compare_identities(scans: Sequence[Moment], cutoff: float, order: float = 2.
     minutes = float(shares[[one.complete for one in given]].sum()) / 60
     n_false = sum(track.false for track in tracks.values())
     return Identities(
-        [_gospa(one, cutoff, order) for one in given],
+        [_gospa(one, cutoff) for one in given],
         [
             {one.names[column]: one.identities[row] for row, column in found}
             for one, found in zip(given, pairs, strict=True)
@@ -247,37 +244,14 @@ def _checked(scan: Moment) -> _Checked:
     P = P.reshape(0, size, size) if P.size == 0 else P
     visible, ignored = (np.asarray(flags, bool) for flags in (scan.visible, scan.ignored))
     names, identities = list(scan.names), list(scan.identities)
-    shapes = (x.shape, P.shape, (len(identities),), truth.shape, (len(names),), visible.shape, ignored.shape)
-    n, m = len(x), len(truth)
-    if shapes != ((n, size), (n, size, size), (n,), (m, size), (m,), (m,), (m,)):
-        raise WildlabError(
-            f"the parts of the scan at {scan.time:g} s do not fit each other: shapes {shapes}",
-            "give (N, k), (N, k, k) and (N,) for the tracks, (M, k) and three times (M,) for the targets",
-        )
-    for words, these in (("track", identities), ("target", names)):
-        twice = next((one for index, one in enumerate(these) if one in these[:index]), None)
-        if twice is not None:
-            raise WildlabError(
-                f"the {words} {twice!r} is there twice at {scan.time:g} s", "give every one a name of its own"
-            )
-    if not (np.isfinite(x).all() and np.isfinite(truth).all()):
-        raise WildlabError(
-            f"a position at {scan.time:g} s is not finite", "leave out tracks and targets without a position"
-        )
-    sd = np.asarray(scan.truth_sd, float)
-    if sd.shape not in ((), (m,)) or not (sd >= 0).all():
-        raise WildlabError(
-            f"truth_sd at {scan.time:g} s is not one number for each of {m} targets, or is below zero",
-            "give (M,) standard deviations, or one for all",
-            field="truth_sd",
-        )
+    sd = np.broadcast_to(np.asarray(scan.truth_sd, float), (len(truth),))
     return _Checked(
         float(scan.time), x, P, identities, truth, names, visible, ignored, bool(scan.complete),
-        np.broadcast_to(sd, (m,)),
+        sd,
     )  # fmt: skip
 
 
-def _gospa(one: _Checked, cutoff: float, order: float) -> Gospa:
+def _gospa(one: _Checked, cutoff: float) -> Gospa:
     """GOSPA of one scan, in which tracks on targets that nobody asks for cost nothing.
 
     The tracks are assigned to all targets as in `gospa`. Those on targets that are not visible or don't-care
@@ -285,36 +259,34 @@ def _gospa(one: _Checked, cutoff: float, order: float) -> Gospa:
     A target takes one track: a second one beside a don't-care target is a false one.
     """
     asked = one.visible & ~one.ignored
-    on = dict(_assign(one.x, one.truth, cutoff, order))
+    on = dict(_assign(one.x, one.truth, cutoff))
     excused = {row for row, column in on.items() if not asked[column]}
     if not one.complete:
         excused |= set(range(len(one.x))) - set(on)
     kept = [row for row in range(len(one.x)) if row not in excused]
-    return gospa(one.truth[asked], one.x[kept], cutoff, order)
+    return gospa(one.truth[asked], one.x[kept], cutoff)
 
 
-def _assign(
-    x: Array, truth: Array, cutoff: float, order: float, kept: NDArray[np.bool_] | None = None
-) -> Pairs:
+def _assign(x: Array, truth: Array, cutoff: float, kept: NDArray[np.bool_] | None = None) -> Pairs:
     """GOSPA's pairs: of those nearer than the cut-off, what costs least; ``kept`` (N, M) costs less."""
     if not (len(x) and len(truth)):
         return []
-    cost = np.minimum(cdist(x, truth), cutoff) ** order
-    near = cost < cutoff**order
+    cost = np.minimum(cdist(x, truth), cutoff) ** 2
+    near = cost < cutoff**2
     if kept is not None:
-        cost = cost - np.where(kept & near, (cutoff / 2) ** order, 0.0)
+        cost = cost - np.where(kept & near, (cutoff / 2) ** 2, 0.0)
     rows, columns = linear_sum_assignment(cost)
     made = near[rows, columns]
     return list(zip(rows[made].tolist(), columns[made].tolist(), strict=True))
 
 
-def _follow(one: _Checked, before: dict[Hashable, Hashable], cutoff: float, order: float) -> Pairs:
+def _follow(one: _Checked, before: dict[Hashable, Hashable], cutoff: float) -> Pairs:
     """The best pairs, the last one of each track being worth more."""
     kept = np.zeros((len(one.x), len(one.truth)), bool)
     for row, identity in enumerate(one.identities):
         if identity in before:
             kept[row] = [name == before[identity] for name in one.names]
-    return sorted(_assign(one.x, one.truth, cutoff, order, kept))
+    return sorted(_assign(one.x, one.truth, cutoff, kept))
 
 
 def _changes(
@@ -420,8 +392,8 @@ class Gospa(NamedTuple):
     n_false: int
 
 
-def gospa(truth: ArrayLike, estimates: ArrayLike, cutoff: float, order: float = 2.0) -> Gospa:
-    """Generalised OSPA (Rahmathullah, Garcia-Fernandez and Svensson 2017) with alpha = 2.
+def gospa(truth: ArrayLike, estimates: ArrayLike, cutoff: float) -> Gospa:
+    """Generalised OSPA (Rahmathullah, Garcia-Fernandez and Svensson 2017) of order 2 with alpha = 2.
 
     A sum over the targets, not a mean; with alpha = 2 it falls into localisation, missed and false targets. A
     pair as far apart as ``cutoff``, or further, is not a pair: it is a missed target and a false one.
@@ -431,10 +403,8 @@ def gospa(truth: ArrayLike, estimates: ArrayLike, cutoff: float, order: float = 
     truth, estimates
         (M, k) and (N, k), in one unit; either may be empty.
     cutoff
-        Distance from which a target counts as missed and an estimate as false, in that unit; to the power of
-        ``order``, each costs half of it.
-    order
-        p of the metric, at least 1: the higher, the more an outlier costs.
+        Distance from which a target counts as missed and an estimate as false, in that unit; of its square
+        each costs half.
 
     Returns
     -------
@@ -444,37 +414,17 @@ def gospa(truth: ArrayLike, estimates: ArrayLike, cutoff: float, order: float = 
     Raises
     ------
     WildlabError
-        If the points do not fit each other or are not finite, the cut-off is not positive or the order below
-        1.
+        If the cut-off is not positive.
     """
-    cost = _costs(truth, estimates, cutoff, order)
+    if not 0 < cutoff < np.inf:
+        raise WildlabError(f"a cut-off of {cutoff:g} makes no metric", "give a positive one")
+    x, y = (np.asarray(points, float) for points in (truth, estimates))
+    cost = np.minimum(cdist(x, y), cutoff) ** 2 if len(x) and len(y) else np.empty((len(x), len(y)))
     rows, columns = linear_sum_assignment(cost)
     # A pair at the cut-off costs as much as the two left alone: it counts as left alone.
-    paired = cost[rows, columns] < cutoff**order
+    paired = cost[rows, columns] < cutoff**2
     near = float(cost[rows, columns][paired].sum())
     n_missed, n_false = (size - int(paired.sum()) for size in cost.shape)
-    missed, false = (n * cutoff**order / 2 for n in (n_missed, n_false))
-    whole, *parts = (part ** (1 / order) for part in (near + missed + false, near, missed, false))
+    missed, false = (n * cutoff**2 / 2 for n in (n_missed, n_false))
+    whole, *parts = (part**0.5 for part in (near + missed + false, near, missed, false))
     return Gospa(whole, parts[0], parts[1], parts[2], n_missed, n_false)
-
-
-def _costs(truth: ArrayLike, estimates: ArrayLike, cutoff: float, order: float) -> Array:
-    """``min(distance, cutoff) ** order`` (M, N)."""
-    if not (0 < cutoff < np.inf and 1 <= order < np.inf):
-        raise WildlabError(
-            f"a cut-off of {cutoff:g} and order {order:g} make no metric",
-            "give a positive cut-off, and an order of at least 1",
-        )
-    x, y = (np.asarray(points, float) for points in (truth, estimates))
-    size = max(x.shape[1] if x.ndim == 2 else 0, y.shape[1] if y.ndim == 2 else 0)
-    x, y = (points.reshape(0, size) if points.size == 0 else points for points in (x, y))
-    if x.ndim != 2 or y.ndim != 2 or x.shape[1] != y.shape[1]:
-        raise WildlabError(
-            f"points of shape {x.shape} do not go with points of shape {y.shape}",
-            "give (M, k) and (N, k), one row per point",
-        )
-    if not (np.isfinite(x).all() and np.isfinite(y).all()):
-        raise WildlabError("a point is not finite", "leave out rows without a position")
-    if not (len(x) and len(y)):
-        return np.empty((len(x), len(y)))
-    return np.asarray(np.minimum(cdist(x, y), cutoff) ** order)

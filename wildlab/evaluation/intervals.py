@@ -25,8 +25,8 @@ class Interval(NamedTuple):
     high: float
 
 
-def mean_interval(values: ArrayLike, probability: float = 0.95) -> Interval:
-    """Mean of what independent runs gave, with Student's interval.
+def mean_interval(values: ArrayLike) -> Interval:
+    """Mean of what independent runs gave, with Student's 95 % interval.
 
     Neighbouring moments of one run are not independent: give one value for each run.
 
@@ -34,18 +34,11 @@ def mean_interval(values: ArrayLike, probability: float = 0.95) -> Interval:
     ----------
     values
         (N,), one for each run, in any unit; NaN are left out.
-    probability
-        With which the interval holds the mean over all such runs.
 
     Returns
     -------
     Interval
         In the unit of the values; its ends are NaN where fewer than two are known, all is where none is.
-
-    Raises
-    ------
-    WildlabError
-        If ``probability`` is not between 0 and 1.
 
     Examples
     --------
@@ -54,19 +47,15 @@ def mean_interval(values: ArrayLike, probability: float = 0.95) -> Interval:
     """
     array = np.asarray(values, float)
     known = array[np.isfinite(array)]
-    if not 0 < probability < 1:
-        raise WildlabError(f"no interval with probability {probability}", "give one between 0 and 1")
     if len(known) < 2:
         return Interval(float(known[0]) if len(known) else np.nan, np.nan, np.nan)
     mean = float(known.mean())
-    half = float(
-        student_quantile((1 + probability) / 2, len(known) - 1) * known.std(ddof=1) / np.sqrt(len(known))
-    )
+    half = float(student_quantile(0.975, len(known) - 1) * known.std(ddof=1) / np.sqrt(len(known)))
     return Interval(mean, mean - half, mean + half)
 
 
 def mean_share_interval(shares: ArrayLike) -> Interval:
-    """As `mean_interval` with 95 %, of shares: it ends at none and at all.
+    """As `mean_interval`, of shares: it ends at none and at all.
 
     Parameters
     ----------

@@ -117,7 +117,7 @@ class Rates(NamedTuple):
     groups: int
 
 
-def rates(counts: ArrayLike, groups: Sequence[object] | None = None, seed: int = 1) -> Rates:
+def rates(counts: ArrayLike, groups: Sequence[object] | None = None) -> Rates:
     """Precision, recall and F1 over frames, with intervals by drawing clips with replacement.
 
     Draws know nothing of an error that has not been seen yet: of 16 found of 16 they give 1 to 1. So an
@@ -130,8 +130,6 @@ def rates(counts: ArrayLike, groups: Sequence[object] | None = None, seed: int =
         (F, 3) found, invented and missed of each frame, as of `Matches.counts`.
     groups
         (F,) to which clip a frame belongs; None takes each for its own.
-    seed
-        Of the draws.
 
     Returns
     -------
@@ -149,7 +147,7 @@ def rates(counts: ArrayLike, groups: Sequence[object] | None = None, seed: int =
     """
     sums = group_sums(np.asarray(counts, float).reshape(-1, 3), groups)
     of_all = shares(sums.sum(axis=0))
-    weights = group_draws(len(sums), seed)
+    weights = group_draws(len(sums))
     if weights is not None:
         drawn = shares(weights @ sums)
         with np.errstate(invalid="ignore"):
@@ -196,15 +194,13 @@ def group_sums(counts: Array, groups: Sequence[object] | None = None) -> Array:
     return sums
 
 
-def group_draws(groups: int, seed: int = 1) -> Array | None:
+def group_draws(groups: int) -> Array | None:
     """How often each clip is in each draw with replacement, the same for the same number of clips.
 
     Parameters
     ----------
     groups
         How many clips there are.
-    seed
-        Of the draws.
 
     Returns
     -------
@@ -213,7 +209,7 @@ def group_draws(groups: int, seed: int = 1) -> Array | None:
     """
     if groups < FEWEST:
         return None
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(1)
     return rng.multinomial(groups, np.full(groups, 1 / groups), DRAWS).astype(float)
 
 
@@ -336,15 +332,13 @@ class Curve(NamedTuple):
     average_precision: Interval
 
 
-def score_levels(scores: ArrayLike, most: int = MOST_LEVELS) -> Array:
-    """Scores to compute a curve at: all that occur, or as many as wanted, with the first and the last.
+def score_levels(scores: ArrayLike) -> Array:
+    """Scores to compute a curve at: all that occur, or `MOST_LEVELS`, with the first and the last.
 
     Parameters
     ----------
     scores
         (N,), finite.
-    most
-        How many at most, 2 or more.
 
     Returns
     -------
@@ -357,9 +351,9 @@ def score_levels(scores: ArrayLike, most: int = MOST_LEVELS) -> Array:
     [0.9, 0.5, 0.2]
     """
     known = np.unique(np.asarray(scores, float))[::-1]
-    if len(known) <= most:
+    if len(known) <= MOST_LEVELS:
         return known
-    return np.asarray(known[np.unique(np.linspace(0, len(known) - 1, most).round().astype(int))])
+    return np.asarray(known[np.unique(np.linspace(0, len(known) - 1, MOST_LEVELS).round().astype(int))])
 
 
 def curve_along_score(frames: Sequence[ScoredFrame], groups: Sequence[object] | None = None) -> Curve:
