@@ -47,7 +47,7 @@ def sensors(twin: TwinParameters, seed: int) -> tuple[Flight, np.ndarray]:
         return turned(airframe(times), boresight)
 
     times = sample_times(5.0, DURATION)
-    gnss = gnss_table(twin, payload, seed)
+    gnss = gnss_table(twin, payload, seed, twin.gnss)
     gnss = gnss[~gnss["time_s"].between(*OUTAGE)].reset_index(drop=True)
     tables = {"imu": imu_table(twin, payload, seed), "gnss": gnss}
     truth = nav_table(payload(times))

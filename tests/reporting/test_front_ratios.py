@@ -27,7 +27,7 @@ def number(
 ) -> Number:
     waiting = verdict if verdict in (FIRST_LOOK, MISSING) else ""
     near = CLOSE if waiting else Closeness(verdict)
-    compared = Comparison(near, inside, ratio, 0.0, fitted=fitted)
+    compared = Comparison(near, inside, ratio, fitted=fitted)
     return Number(
         "error", "kf", "m", "H", 1.0, 1, ratio, None, None, compared, waiting, ratio=ratio, fitted=fitted
     )

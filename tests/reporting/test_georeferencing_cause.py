@@ -69,7 +69,7 @@ def diagnosis(winner, *others, outliers=(), alike=(), rivals=(), out=0):
 
 
 def ellipses(word, factor=1.0, low=0.9, high=1.1):
-    return EllipseVerdict(word, Interval(0.9, 0.0, 1.0), Interval(factor, low, high), 0.9, 50)
+    return EllipseVerdict(word, Interval(0.9, 0.0, 1.0), Interval(factor, low, high), 50)
 
 
 def calibration(names, values, sd=0.1):

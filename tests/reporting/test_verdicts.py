@@ -26,7 +26,7 @@ from wildlab.studies import page
 
 
 def number(closeness: Closeness, compatibility: Compatibility, fitted: str = "") -> Comparison:
-    return Comparison(closeness, compatibility, 1.0, 0.0, fitted=fitted)
+    return Comparison(closeness, compatibility, 1.0, fitted=fitted)
 
 
 GOOD = number(Closeness.CLOSE, Compatibility.WITHIN)

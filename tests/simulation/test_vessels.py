@@ -258,5 +258,3 @@ def test_the_outline_has_the_ships_size_and_bow(twin):
     assert corners.mean(axis=1) == pytest.approx(target_path(twin.target, 1)(np.array([0.0, 30.0])))
     bow = corners[:, [0, 3]].mean(axis=1) - corners.mean(axis=1)
     assert bow == pytest.approx(np.tile([-35.0, 0.0, 0.0], (2, 1)), abs=1e-9)  # course 180 deg
-    with pytest.raises(ValueError, match="no outline"):
-        target_outline(load_twin("slow-vessel").target, 1)

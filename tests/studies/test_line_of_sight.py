@@ -120,6 +120,6 @@ def test_times_are_alike_where_they_are_at_every_height(spread, rays, alike):
 
 
 def test_times_are_taken_of_every_way_at_every_height():
-    times = timed([3], TWIN, repeats=1)
+    times = timed([3], TWIN)
     assert (times[list(WAYS)].to_numpy() > 0).all() and times.shape == (1, 5 * len(HEIGHTS))
     assert (furthest_ratio(times, RAYS, ANGLES) >= 1).all()

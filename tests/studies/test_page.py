@@ -45,7 +45,7 @@ def test_a_tile_has_the_number_its_interval_and_the_print(entry, printed, number
 def test_a_published_number_has_ours_beside_it():
     one = Number(
         "mae", "ekf", "deg", "H table 7.5", 1.2, 1, 3.456, None, None,
-        Comparison(Closeness.NOT_CLOSE, Compatibility.WITHIN, 2.88, 0.0),
+        Comparison(Closeness.NOT_CLOSE, Compatibility.WITHIN, 2.88),
     )  # fmt: skip
     page = published_table([one], {"ekf": "EKF"}, {"mae": "mean error"})
     cells = re.findall(r"<t[hd][^>]*>([^<]*)</t[hd]>", page.split("<tbody")[1])

@@ -41,14 +41,14 @@ def test_a_seed_has_all_numbers(numbers):
     decided = {claim["id"] for claim in load_claims("wildlife-detection") if "needs" not in claim}
     assert decided == set(checks_of("wildlife-detection", spread))
     for subject in (*METHODS, *PROPOSED):
-        at = wildlife_detection.places([CLOUDY])
+        at = wildlife_detection.places(CLOUDY)
         assert wildlife_detection.counts_of(spread, subject, at).shape == (9, 3)
     assert not wildlife_detection.counts_of(spread, SMALL, ["never"]).size
 
 
 def test_the_sun_makes_ground_as_warm_as_animals(numbers):
     at = {
-        weather: [numbers["ground", f"as_warm_{one}"] for one in wildlife_detection.places([weather])]
+        weather: [numbers["ground", f"as_warm_{one}"] for one in wildlife_detection.places(weather)]
         for weather in (NIGHT, NOON)
     }
     assert np.nanmean(at[NIGHT]) < 0.1 < np.nanmean(at[NOON])

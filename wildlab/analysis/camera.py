@@ -121,7 +121,6 @@ def calibrate_images(
     paths: Sequence[Path],
     board: Board,
     lens: str = "auto",
-    square_pixels: bool = False,
     leave_out: Sequence[str] = (),
     progress: Callable[[Iterable[Path]], Iterable[Path]] = iter,
 ) -> CameraCalibration:
@@ -135,8 +134,6 @@ def calibrate_images(
         What to look for.
     lens
         One of `wildlab.geometry.intrinsics.LENSES`, or "auto": chosen on views held out.
-    square_pixels
-        Whether columns and rows have one focal length.
     leave_out
         Names of images not to use.
     progress
@@ -179,7 +176,7 @@ def calibrate_images(
     used = [one for one in images if one.uv is not None]
     if len(used) < FEWEST:
         _refuse_few(images, len(used), board)
-    return solve_boards(tuple(images), board, width, height, lens, square_pixels)
+    return solve_boards(tuple(images), board, width, height, lens)
 
 
 def solve_boards(
@@ -188,7 +185,6 @@ def solve_boards(
     width: int,
     height: int,
     lens: str = "auto",
-    square_pixels: bool = False,
 ) -> CameraCalibration:
     """The same from boards that are found already.
 
@@ -196,7 +192,7 @@ def solve_boards(
     ----------
     images
         With the pixels of their boards.
-    board, lens, square_pixels
+    board, lens
         As for `calibrate_images`.
     width, height
         Of the images, pixels.
@@ -213,14 +209,14 @@ def solve_boards(
     used = [one for one in images if one.uv is not None and not one.problem]
     points, uv = board.points / board.spacing, np.array([one.uv for one in used])
     choice = choose_lens(points, uv, width, height) if lens == "auto" else LensChoice(lens, {})
-    found = calibrate_camera(points, uv, width, height, choice.lens, square_pixels)
+    found = calibrate_camera(points, uv, width, height, choice.lens)
     held_out = held_out_errors(found, points, uv)
     odd, rest = np.zeros(len(uv), bool), None
     errors = held_out
     # One at a time, the worst first: a view that is wrong pulls the camera away from others too.
     while odd.sum() < _most_odd(len(uv)) and (wrong := odd_views(errors)).any():
         odd[np.flatnonzero(~odd)[np.where(wrong, errors, -np.inf).argmax()]] = True
-        rest = calibrate_camera(points, uv[~odd], width, height, choice.lens, square_pixels)
+        rest = calibrate_camera(points, uv[~odd], width, height, choice.lens)
         errors = held_out_errors(rest, points, uv[~odd])
     names = tuple(one.name for one, is_odd in zip(used, odd, strict=True) if is_odd)
     return CameraCalibration(board, width, height, images, choice, found, held_out, names, rest)
@@ -438,7 +434,7 @@ def _odd(found: CameraCalibration) -> list[Fact]:
     moved = ", ".join(
         f"{name} {found.found.value(name):.1f} -> {rest.value(name):.1f}"
         for name in found.found.names
-        if name in (*PINHOLE, "f")
+        if name in PINHOLE
     )
     option = " ".join(f"--without {name}" for name in found.odd)
     return [

@@ -64,7 +64,6 @@ GRID = pair(int, "xX×", "9x6")
     show_default=True,
     help="How it bends; auto: the simplest that fits as well.",
 )
-@click.option("--square-pixels", is_flag=True, help="One focal length for both sides.")
 @click.option("--without", multiple=True, metavar="NAME", help="An image to leave out.")
 @shared.as_json
 def camera(
@@ -77,7 +76,6 @@ def camera(
     overwrite: bool,
     name: str,
     lens: str,
-    square_pixels: bool,
     without: tuple[str, ...],
     as_json: bool,
 ) -> None:
@@ -114,7 +112,6 @@ def camera(
         still_files(list(images)),
         Board(pattern, columns, rows, square),  # type: ignore[arg-type]
         lens,
-        square_pixels,
         without,
         lambda paths: track(paths, "looking for boards", console=console, transient=True),
     )

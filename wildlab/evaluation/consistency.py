@@ -336,13 +336,12 @@ class Whiteness(NamedTuple):
     """Whether a sequence of innovations is white.
 
     ``autocorrelation`` (m, lags + 1) of each element, ``bound`` what that of white noise stays below at each
-    lag in 95 % of cases; ``statistic`` and ``p_value`` of all elements and lags at once (`portmanteau`);
+    lag in 95 % of cases; ``p_value`` of all elements and lags at once (`portmanteau`);
     ``n``: innovations it is from.
     """
 
     autocorrelation: Array
     bound: float
-    statistic: float
     p_value: float
     n: int
 
@@ -384,9 +383,8 @@ def innovation_whiteness(innovations: ArrayLike, lags: int) -> Whiteness:
         raise WildlabError(
             f"{len(v)} innovations are too few for {lags} lags", "ask for fewer lags, or a longer track"
         )
-    statistic, p_value = portmanteau(v, lags)
     correlation = np.stack([autocorrelation(column, lags) for column in v.T])
-    return Whiteness(correlation, white_bound(len(v)), statistic, p_value, len(v))
+    return Whiteness(correlation, white_bound(len(v)), portmanteau(v, lags)[1], len(v))
 
 
 def portmanteau(series: ArrayLike, lags: int) -> tuple[float, float]:

@@ -189,9 +189,7 @@ class TrackSummary(NamedTuple):
     mean_east: float
     mae: float
     rmse: float
-    mean_speed: float
     rmse_speed: float
-    mean_course: float
     rmse_course: float
 
 
@@ -212,9 +210,6 @@ def summarise_track(errors: TrackErrors) -> TrackSummary:
     known = ~(errors.no_truth | errors.no_estimate)
     e = errors.position[known]
     distance = np.hypot(*e.T)
-    # The mean of a direction is that of its unit vectors.
-    turn = errors.course[np.isfinite(errors.course)]
-    mean_course = float(np.angle(np.mean(np.exp(1j * turn)))) if len(turn) else float("nan")
     return TrackSummary(
         int(known.sum()),
         int(errors.no_truth.sum()),
@@ -223,9 +218,7 @@ def summarise_track(errors: TrackErrors) -> TrackSummary:
         _mean(e[:, 1]),
         _mean(distance),
         _root_mean_square(distance),
-        _mean(errors.speed),
         _root_mean_square(errors.speed),
-        mean_course,
         _root_mean_square(errors.course),
     )
 

@@ -137,8 +137,6 @@ class Identities(NamedTuple):
         Tracks that are false, over the minutes of the scans that are complete; NaN where no time passes.
     targets, tracks
         By name and by identity, in the order of their first scan.
-    incomplete
-        Scans that do not have all targets.
     """
 
     gospa: list[Gospa]
@@ -148,7 +146,6 @@ class Identities(NamedTuple):
     false_tracks_per_minute: float
     targets: dict[Hashable, TargetLife]
     tracks: dict[Hashable, TrackLife]
-    incomplete: int = 0
 
 
 class _Checked(NamedTuple):
@@ -232,7 +229,6 @@ def compare_identities(scans: Sequence[Moment], cutoff: float) -> Identities:
         n_false / minutes if minutes > 0 else np.nan,
         _target_lives(given, pairs, swaps, breaks),
         tracks,
-        sum(not one.complete for one in given),
     )
 
 

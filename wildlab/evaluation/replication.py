@@ -112,8 +112,6 @@ class Comparison:
         The two answers.
     ratio
         Ours to the published one; None where one of them is not above zero, and of a signed mean.
-    difference
-        Ours minus the published one.
     reason
         Why it is not judged, or what the answer rests on.
     fitted
@@ -123,7 +121,6 @@ class Comparison:
     closeness: Closeness
     compatibility: Compatibility
     ratio: float | None
-    difference: float
     reason: str = ""
     fitted: str = ""
 
@@ -170,10 +167,10 @@ def reproduction(closeness: str, compatibility: str) -> Reproduction:
     return Reproduction.OPEN
 
 
-def not_judged(here: float, published: float, reason: str) -> Comparison:
+def not_judged(reason: str) -> Comparison:
     """A comparison that comes to nothing, and why."""
     nothing = Closeness.NOT_JUDGED, Compatibility.NOT_JUDGED
-    return Comparison(*nothing, None, here - published, reason)
+    return Comparison(*nothing, None, reason)
 
 
 def power_of(values: ArrayLike, kind: str) -> float:
@@ -277,7 +274,7 @@ def compare_calculation(
     reason = f"tolerance {rounding:g}" + (f", inputs {low:.4g} to {high:.4g}" if inputs else "")
     if near is Closeness.NOT_CLOSE:
         reason += f", {abs(off / published):.1%} off".replace("%", " %") if published else f", {off:.3g} off"
-    return Comparison(near, Compatibility.NOT_JUDGED, _ratio(here, published), off, reason)
+    return Comparison(near, Compatibility.NOT_JUDGED, _ratio(here, published), reason)
 
 
 def compare_mean(
@@ -305,7 +302,7 @@ def compare_mean(
     'close, outside'
     """
     if error is None or published_error is None:
-        return not_judged(here, published, "a standard error is not known")
+        return not_judged("a standard error is not known")
     near = _closeness(
         (here - _Z * error, here + _Z * error), _margin("rate", published - rounding, published + rounding)
     )
@@ -313,7 +310,7 @@ def compare_mean(
     inside = abs(here - published) <= rounding + chance + _SLACK
     compatible = Compatibility.WITHIN if inside else Compatibility.OUTSIDE
     reason = f"chance {100 * chance:.2g} %"
-    return Comparison(near, compatible, _ratio(here, published), here - published, reason)
+    return Comparison(near, compatible, _ratio(here, published), reason)
 
 
 def compare_flight(
@@ -366,10 +363,10 @@ def compare_flight(
     """
     if kind not in KINDS:
         raise WildlabError(f"no margin for {kind!r}", f"use one of: {', '.join(KINDS)}", field="kind")
-    signed, difference = kind == "signed mean", here - published
+    signed = kind == "signed mean"
     ratio = None if signed else _ratio(here, published)
     if not signed and published + rounding <= 0:
-        return not_judged(here, published, "a ratio needs numbers above zero")
+        return not_judged("a ratio needs numbers above zero")
     near = Closeness.NOT_JUDGED
     if not signed:
         allowed = _margin(kind, *(share or (published - rounding, published + rounding)))
@@ -382,7 +379,7 @@ def compare_flight(
     else:
         weak = power is not None and power < LEAST_POWER
         compatible = Compatibility.NO_POWER if weak else Compatibility.WITHIN
-    return Comparison(near, compatible, ratio, difference, reason)
+    return Comparison(near, compatible, ratio, reason)
 
 
 def _margin(kind: str, low: float, high: float) -> tuple[float, float]:

@@ -31,8 +31,8 @@ LENSES: dict[str, tuple[str, ...]] = {
     "tangential": ("k1", "k2", "p1", "p2"),
     "full": ("k1", "k2", "p1", "p2", "k3"),
 }
-#: Columns of OpenCV's derivatives, behind six of the pose; "f" is one focal length for columns and rows.
-_COLUMNS = {name: (6 + i,) for i, name in enumerate((*PINHOLE, *LENSES["full"]))} | {"f": (6, 7)}
+#: Columns of OpenCV's derivatives, behind six of the pose.
+_COLUMNS = {name: 6 + i for i, name in enumerate((*PINHOLE, *LENSES["full"]))}
 #: What holds a parameter of the lens.
 _HELD = {
     "k1": cv2.CALIB_FIX_K1,
@@ -82,7 +82,7 @@ class Intrinsics(NamedEstimates):
     camera
         The estimate.
     names
-        The P parameters estimated: of `PINHOLE` (or "f" for one focal length) and of one of `LENSES`.
+        The P parameters estimated: of `PINHOLE` and of one of `LENSES`.
     values
         (P,) pixels, or no unit.
     covariance
@@ -144,7 +144,7 @@ def parameters_of(camera: Camera) -> dict[str, float]:
 
 def _camera(values: dict[str, float], like: Camera) -> Camera:
     """A camera of the same size with these parameters; without distortion where they name none."""
-    fx, fy = (values["f"], values["f"]) if "f" in values else (values["fx"], values["fy"])
+    fx, fy = values["fx"], values["fy"]
     k1, k2, p1, p2, k3 = (values.get(name, 0.0) for name in LENSES["full"])
     return Camera(like.width, like.height, fx, fy, values["cx"], values["cy"], 0.0, (k1, k2, p1, p2, k3))
 
@@ -155,7 +155,6 @@ def calibrate_camera(
     width: int,
     height: int,
     lens: str = "full",
-    square_pixels: bool = False,
     resample: bool = True,
 ) -> Intrinsics:
     """Estimate a camera from views of a flat board.
@@ -170,8 +169,6 @@ def calibrate_camera(
         Of the image, pixels.
     lens
         One of `LENSES`: what is estimated of its distortion.
-    square_pixels
-        Whether columns and rows have one focal length.
     resample
         Whether each view is left out in turn, for the covariance; else that is NaN.
 
@@ -197,7 +194,7 @@ def calibrate_camera(
     """
     board, uv = np.asarray(board, float), np.asarray(uv, float)
     _check(board, uv)
-    names = (*(("f", *PINHOLE[2:]) if square_pixels else PINHOLE), *LENSES[lens])
+    names = (*PINHOLE, *LENSES[lens])
     camera, views = _solve(board, uv, names, (width, height))
     values = _values(camera, names)
     seen = np.isfinite(uv).all(axis=-1)
@@ -265,10 +262,9 @@ def _solve(
     points = [board[one].astype(np.float32) for one in seen]
     pixels = [view[one].astype(np.float32) for view, one in zip(uv, seen, strict=True)]
     flags = sum(flag for name, flag in _HELD.items() if name not in names) | cv2.CALIB_USE_INTRINSIC_GUESS
-    flags |= cv2.CALIB_FIX_ASPECT_RATIO if "f" in names else 0
     found: list[Any]
     try:
-        start, bends = cv2.initCameraMatrix2D(points, pixels, size, int("f" in names)), np.zeros(5)
+        start, bends = cv2.initCameraMatrix2D(points, pixels, size, 0), np.zeros(5)
         if near is not None:
             start, bends = near.matrix, np.array(near.distortion)
         _, *found = cv2.calibrateCamera(points, pixels, size, start, bends, flags=flags, criteria=STOP)
@@ -288,7 +284,7 @@ def _solve(
 
 
 def _values(camera: Camera, names: tuple[str, ...]) -> Array:
-    by_name = parameters_of(camera) | {"f": camera.fx}
+    by_name = parameters_of(camera)
     return np.array([by_name[name] for name in names])
 
 
@@ -298,7 +294,7 @@ def _derivatives(
     """Of the pixels (M, 2) of points (M, 3) in a view: by P parameters (2M, P), by its pose (2M, 6)."""
     bends = np.array(camera.distortion)
     found = np.asarray(cv2.projectPoints(points, cv2.Rodrigues(R)[0], t, camera.matrix, bends)[1], float)
-    return np.stack([found[:, _COLUMNS[name]].sum(axis=1) for name in names], axis=-1), found[:, :6]
+    return np.stack([found[:, _COLUMNS[name]] for name in names], axis=-1), found[:, :6]
 
 
 def _information(camera: Camera, R: Array, t: Array, points: Array, names: tuple[str, ...]) -> Array:

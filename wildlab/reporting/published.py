@@ -340,7 +340,7 @@ def judge(row: Mapping[str, Any], ours: Recorded) -> Comparison | None:
     Returns
     -------
     Comparison or None
-        None where the run has no number for it. A difference is in the unit of the number.
+        None where the run has no number for it.
     """
     name, subject = str(row["name"]), str(row["subject"])
     found = recorded_for(row, ours)
@@ -349,17 +349,17 @@ def judge(row: Mapping[str, Any], ours: Recorded) -> Comparison | None:
         return None
     value = abs(float(row["value"])) if row["by_size"] else float(row["value"])
     if row["unjudged"]:
-        return not_judged(here, value, str(row["unjudged"]))
+        return not_judged(str(row["unjudged"]))
     rounding, known = float(row["rounding"]), ours.get((error_name(name), subject), {})
     error = known.get("value")
     if row["kind"] == CALCULATED and known and error is None:
-        return not_judged(here, value, "a standard error is not known")
+        return not_judged("a standard error is not known")
     if row["kind"] == CALCULATED:
         compared = compare_calculation(here, value, rounding, inputs=_pair(found, "low", "high"), error=error)
         return replace(compared, fitted=str(row["fitted"]))
     kind = "rate" if row["kind"] in (SHARE_OF_IMAGES, MEAN_OF_RUNS) else quantity_kind(name)
     if not kind:
-        return not_judged(here, value, "no margin is fixed for this quantity")
+        return not_judged("no margin is fixed for this quantity")
     # A rate's margin is of odds.
     unit = 100.0 if kind == "rate" and row["unit"] == "%" else 1.0
     if row["kind"] == MEAN_OF_RUNS:
@@ -386,7 +386,7 @@ def judge(row: Mapping[str, Any], ours: Recorded) -> Comparison | None:
             predicted=None if alone else _pair(found, "low", "high", unit),
             power=found.get("power"),
         )
-    return replace(compared, difference=here - value, fitted=str(row["fitted"]))
+    return replace(compared, fitted=str(row["fitted"]))
 
 
 #: What a number has from the published file.

@@ -219,8 +219,6 @@ def extended_target_frames_and_detections(
     WildlabError
         Where the target is not in view in so many images, or in another number of segments.
     """
-    if twin.segments is None:
-        raise ValueError("a target with an outline needs segments")
     blobs = _visible(view, target, seed)
     images, segment = _kept(twin.segments, view, blobs, fewer=twin.moved_from is not None)
     areas = np.array([blobs[image].area for image in images])

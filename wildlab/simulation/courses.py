@@ -523,13 +523,11 @@ def _closed_course(twin: TwinParameters) -> Array:
     Raises
     ------
     ValueError
-        Where its turns do not fit, or the twin flies no closed course.
+        Where its turns do not fit.
     """
     if twin.survey is not None:
         return survey_course(list(twin.enclosures.values()), twin.survey.row_distance.si)
     route = twin.route
-    if route is None:
-        raise ValueError("this twin flies no closed course")
     shape: Shape = "eight" if route.shape.text == "eight" else "racetrack"
     corners = shape_corners(shape, route.length.si, route.width.si)
     corners += np.array([route.ahead.si, route.right.si])
@@ -550,11 +548,7 @@ def loiter_centre(twin: TwinParameters) -> Array:
     ------
     WildlabError
         Where the camera does not look down at the target's height there.
-    ValueError
-        Where the twin flies no loiter.
     """
-    if twin.loiter is None or twin.target is None:
-        raise ValueError("this twin flies no loiter")
     there = _undisturbed_start(twin)
     camera = twin_manifest(twin, 0).geometry_camera()
     middle = [[twin.camera.width.number / 2, twin.camera.height.number / 2]]
@@ -583,9 +577,7 @@ def _circle(
     altitude_error: Disturbance | None = None,
 ) -> FlightPath:
     """The loiter's path; it begins ``turned`` rad round from where it passes the target."""
-    circle: Group | None = twin.loiter
-    if circle is None:
-        raise ValueError("this twin flies no loiter")
+    circle: Group = twin.loiter
     turn: Turn = "clockwise" if circle.turn.text == "clockwise" else "counter-clockwise"
     quarter = math.pi / 2 if turn == "clockwise" else -math.pi / 2
     return loiter_path(

@@ -159,9 +159,7 @@ def synthetic_landscape(
     return Terrain(height, north=corner[0], east=corner[1], step=step, sd=0.0)
 
 
-def grow_trees(
-    land: Terrain, seed: int, *, share: float = TREES_SHARE, height: float = TREES_M, stand: float = STAND_M
-) -> Terrain:
+def grow_trees(land: Terrain, seed: int, share: float = TREES_SHARE) -> Terrain:
     """The same land with trees on it: the surface that hides what stands below and behind it.
 
     F's map has none (F 8.2). Here they stand in groups, wherever a smooth random field is highest.
@@ -174,20 +172,11 @@ def grow_trees(
         The same gives the same trees.
     share
         Of the ground that is below trees, 0 to 1.
-    height
-        Of a tree, metres on average.
-    stand
-        How far a group reaches, metres.
 
     Returns
     -------
     Terrain
         Its nodes are those of the land, as high as the tree that stands there.
-
-    Raises
-    ------
-    WildlabError
-        Where the share is not between 0 and 1, or a length is not above zero.
 
     Examples
     --------
@@ -195,15 +184,10 @@ def grow_trees(
     >>> round(float((grow_trees(land, 1).height > land.height).mean()), 2)
     0.15
     """
-    if not (0 <= share <= 1 and 0 < height < np.inf and 0 < stand < np.inf):
-        raise WildlabError(
-            f"trees of {height:g} m on {share:g} of the ground, {stand:g} m across",
-            "give a share between 0 and 1, and metres above zero",
-        )
     rng = np.random.default_rng([seed, 1])
-    noise = ndimage.gaussian_filter(rng.standard_normal(land.height.shape), stand / land.step, mode="wrap")
+    noise = ndimage.gaussian_filter(rng.standard_normal(land.height.shape), STAND_M / land.step, mode="wrap")
     covered = noise > np.quantile(noise, 1 - share) if share < 1 else np.ones(noise.shape, bool)
-    trees = covered * height * rng.uniform(1 - UNEVEN, 1 + UNEVEN, noise.shape)
+    trees = covered * TREES_M * rng.uniform(1 - UNEVEN, 1 + UNEVEN, noise.shape)
     return Terrain((land.height + trees).astype(np.float32), land.north, land.east, land.step, land.sd)
 
 

@@ -295,8 +295,6 @@ def mounted_imu(twin: TwinParameters) -> Array | None:
 def payload_boresight(twin: TwinParameters, seed: int) -> AttitudeDisturbance:
     """How the payload, which carries the IMU and the antennas, turns against the airframe with the camera."""
     b, rng = twin.boresight, stream(seed, "boresight")
-    if b is None:
-        raise ValueError("this twin carries no payload")
     band = (b.shortest_period.si, b.longest_period.si)
     roll, pitch, yaw = (
         band_limited_disturbance(sd.si, *band, rng) for sd in (b.roll_sd, b.pitch_sd, b.yaw_sd)
@@ -310,8 +308,6 @@ def imu_table(twin: TwinParameters, payload: Trajectory, seed: int) -> pd.DataFr
     It feels the motion in its own axes, as it is mounted, and errs in these. `as_mounted` gives its readings
     as they were before the calibration.
     """
-    if twin.imu is None:
-        raise ValueError("this twin carries no inertial unit")
     times = sample_times(twin.imu.rate.si, twin.flight.duration.si)
     # The airframe flies as if n were inertial; its sensors feel the Earth turn, and where on it they are.
     earth = local_earth(twin.place.latitude.si, twin.place.height.si)
@@ -352,17 +348,12 @@ def as_mounted(readings: pd.DataFrame, R_bi: Array) -> pd.DataFrame:
     return readings.assign(**own)
 
 
-def gnss_table(
-    twin: TwinParameters, payload: Trajectory, seed: int, stated: Group | None = None
-) -> pd.DataFrame:
+def gnss_table(twin: TwinParameters, payload: Trajectory, seed: int, stated: Group) -> pd.DataFrame:
     """Fixes of the two receivers over the whole flight, and the velocity that the first one gives.
 
-    What the columns say of its accuracy is that of the receivers as ``stated``; left out, as they are.
+    What the columns say of its accuracy is that of the receivers as ``stated``.
     """
     g = twin.gnss
-    if g is None:
-        raise ValueError("this twin carries no receivers")
-    sheet = g if stated is None else stated
     times = sample_times(g.rate.si, twin.flight.duration.si)
     motion, rate = payload(times), angular_rates(attitude_along(payload), times)
     arms = {
@@ -381,11 +372,11 @@ def gnss_table(
                 f"v_{axis}_m_s": (velocity + slip)[:, i] for i, axis in enumerate(("north", "east", "down"))
             }
     for axis, noise, correlated in (
-        ("horizontal", sheet.horizontal_noise.si, sheet.horizontal_correlated_sd.si),
-        ("vertical", sheet.vertical_noise.si, sheet.vertical_correlated_sd.si),
+        ("horizontal", stated.horizontal_noise.si, stated.horizontal_correlated_sd.si),
+        ("vertical", stated.vertical_noise.si, stated.vertical_correlated_sd.si),
     ):
         columns[f"sd_{axis}_m"] = np.full(len(times), math.hypot(noise, correlated))
-    columns["sd_velocity_m_s"] = np.full(len(times), sheet.velocity_noise.si)
+    columns["sd_velocity_m_s"] = np.full(len(times), stated.velocity_noise.si)
     for which, arm in arms.items():
         columns |= {f"{which}lever_{axis}_m": np.full(len(times), arm[i]) for i, axis in enumerate("xyz")}
     return pd.DataFrame(columns)

@@ -160,16 +160,8 @@ def way_along(motion: Group, times: ArrayLike) -> Array:
 
 
 def target_outline(target: Group, seed: int) -> Signal:
-    """Corners of a target's outline in n: times (N,) s -> (N, 4, 3) m, the bow along its mean course.
-
-    Raises
-    ------
-    ValueError
-        Where it has none.
-    """
+    """Corners of a target's outline in n: times (N,) s -> (N, 4, 3) m, the bow along its mean course."""
     outline, motion = target.outline, target.motion
-    if outline is None or motion is None:
-        raise ValueError("this target has no outline")
     cos, sin = np.cos(motion.course.si), np.sin(motion.course.si)
     half = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * [outline.length.si / 2, outline.beam.si / 2]
     corners = np.zeros((4, 3))

@@ -122,12 +122,12 @@ def off_ideal(anees: ArrayLike) -> Array:
     return np.abs(np.log(np.asarray(anees, float) / IDEAL))
 
 
-def stays(table: pd.DataFrame, mostly: float = MOSTLY) -> NDArray[np.bool_]:
+def stays(table: pd.DataFrame) -> NDArray[np.bool_]:
     """Which tracks stay with their boat, by the rows of `tracks_table`; see `MOSTLY`.
 
     One that never began, or whose boat the sensor never saw, does not.
     """
-    return np.asarray(table["share_with_target"] >= mostly, bool)
+    return np.asarray(table["share_with_target"] >= MOSTLY, bool)
 
 
 def consistent(table: pd.DataFrame) -> NDArray[np.bool_]:

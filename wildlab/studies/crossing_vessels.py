@@ -571,11 +571,10 @@ def join(crossing: Crossing, looks: Appearance, rule: str) -> Numbers:
 
 
 class Flown(NamedTuple):
-    """A flight, what its camera saw of the two, how they looked and their detections, and H's tracks."""
+    """What a flight's camera saw of the two, how they looked, and H's tracks."""
 
     crossing: Crossing
     looks: list[Array]
-    appearance: Appearance
     banks: dict[str, Bank]
 
 
@@ -586,7 +585,7 @@ def fly(seed: int, twin: str, images: int, flight: Flight | None = None) -> Flow
     appearance = dressed(crossing, looks, seed)
     rules = {DISTANCE: None, FEATURES: appearance}
     banks = {name: run_bank(crossing.detections, how) for name, how in rules.items()}
-    return Flown(crossing, looks, appearance, banks)
+    return Flown(crossing, looks, banks)
 
 
 def all_numbers(flown: Flown) -> Numbers:

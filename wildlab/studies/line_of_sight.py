@@ -247,12 +247,12 @@ MOST = 20
 MOST_POINTS, PART = 2000, 10
 
 
-def best_times(calls: Mapping[str, Callable[[], object]], repeats: int) -> dict[str, float]:
+def best_times(calls: Mapping[str, Callable[[], object]]) -> dict[str, float]:
     """Fewest seconds of the processor for each call, all in turn: what else a machine does only adds."""
     for call in calls.values():
         call()  # the first one compiles, and fills the caches
     times: dict[str, list[float]] = {name: [] for name in calls}
-    for _ in range(repeats):
+    for _ in range(REPEATS):
         for name, call in calls.items():
             begun = time.process_time()
             call()
@@ -260,7 +260,7 @@ def best_times(calls: Mapping[str, Callable[[], object]], repeats: int) -> dict[
     return {name: min(each) for name, each in times.items()}
 
 
-def timed(seeds: Iterable[int], twin: str, repeats: int = REPEATS) -> pd.DataFrame:
+def timed(seeds: Iterable[int], twin: str) -> pd.DataFrame:
     """Times of the three ways over views like those of the trials.
 
     Parameters
@@ -269,8 +269,6 @@ def timed(seeds: Iterable[int], twin: str, repeats: int = REPEATS) -> pd.DataFra
         Of the lands; the first `MOST` are taken.
     twin
         Whose camera it is.
-    repeats
-        Of each call, of which the quickest counts.
 
     Returns
     -------
@@ -296,8 +294,7 @@ def timed(seeds: Iterable[int], twin: str, repeats: int = REPEATS) -> pd.DataFra
                     ANGLES: partial(compare_angles, land, nodes, lens),
                     EXACT: partial(lines_clear, land, ends, lens),
                     VIEW: partial(in_field_of_view, halves, points[::PART], lens, view.R_nc),
-                },
-                repeats,
+                }
             )
             for way, seconds in found.items():
                 count = len(points[::PART]) if way == VIEW else len(some)

@@ -67,23 +67,13 @@ def printed_camera(width: int, height: int) -> Camera:
     return Camera(width, height, FX, FY, CX, CY, 0.0, (K1, 0.0, 0.0, 0.0, 0.0))
 
 
-def read_videos(fx: float = FX, fy: float = FY, cx: float = CX, cy: float = CY) -> list[Video]:
-    """How well the numbers fit each of `VIDEOS`, the best first.
-
-    Parameters
-    ----------
-    fx, fy, cx, cy
-        Of the calibration, pixels.
-
-    Returns
-    -------
-    list of Video
-    """
+def read_videos() -> list[Video]:
+    """How well the numbers of the calibration fit each of `VIDEOS`, the best first."""
     found = []
     for name, (width, height, columns, rows) in VIDEOS.items():
         sheet = (DATA_SHEET * width / columns, DATA_SHEET * height / rows)
-        off = 100 * float(np.sqrt(((fx / sheet[0] - 1) ** 2 + (fy / sheet[1] - 1) ** 2) / 2))
-        centre = float(np.hypot(cx - (width - 1) / 2, cy - (height - 1) / 2))
+        off = 100 * float(np.sqrt(((FX / sheet[0] - 1) ** 2 + (FY / sheet[1] - 1) ** 2) / 2))
+        centre = float(np.hypot(CX - (width - 1) / 2, CY - (height - 1) / 2))
         found.append(Video(name, width, height, *sheet, off, centre))
     return sorted(found, key=lambda one: one.off)
 

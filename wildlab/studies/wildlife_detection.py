@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
@@ -365,10 +365,9 @@ def pieces_of(picture: Picture, thresholds: Warm) -> float:
     return float(np.mean(pieces)) if pieces else float("nan")
 
 
-def places(weathers: Iterable[str] = tuple(WEATHERS), heights: Iterable[int] = tuple(VIEWS)) -> list[str]:
-    """Names of pictures: of those weathers, from those heights."""
-    tall = list(heights)
-    return [f"{weather}_{height}" for weather in weathers for height in tall]
+def places(weather: str) -> list[str]:
+    """Names of the pictures of a weather, from all heights."""
+    return [f"{weather}_{height}" for height in VIEWS]
 
 
 def counts_of(runs: pd.DataFrame, subject: str, at: Sequence[str]) -> Array:
@@ -398,7 +397,7 @@ def rates_metrics(runs: pd.DataFrame) -> list[tuple[str, str, Interval, int]]:
     found = []
     for subject in (*METHODS, *PROPOSED):
         for weather in WEATHERS:
-            at = places([weather])
+            at = places(weather)
             one, alarms = rates_of(runs, subject, at), false_alarms(runs, subject, at)
             if one.groups:
                 values = {"recall": one.recall, "f1": one.f1, "false_alarms_per_image": alarms}
@@ -481,7 +480,7 @@ def rates_by_weather(
     """Recall, or false alarms per image, by weather and method with their intervals."""
     series, most = {}, 1.0
     for method in (CONSTANT, OVER_MEAN, SUBTRACTED, ENHANCED, BY_SIZE):
-        each = [places([weather]) for weather in WEATHERS]
+        each = [places(weather) for weather in WEATHERS]
         if what == "recall":
             found = 100 * np.array([rates_of(runs, method, at).recall for at in each])
         else:
@@ -500,7 +499,7 @@ def methods_table(runs: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame:
     """F1 of every method by weather."""
     rows = []
     for method in (*METHODS, *PROPOSED):
-        each = {weather: rates_of(runs, method, places([weather])).f1 for weather in WEATHERS}
+        each = {weather: rates_of(runs, method, places(weather)).f1 for weather in WEATHERS}
         rows.append(
             {"method": names[method]} | {key: interval_words(f1, 2, least=0.0) for key, f1 in each.items()}
         )
