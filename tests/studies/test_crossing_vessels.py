@@ -12,7 +12,7 @@ from wildlab.studies.crossing_vessels import (
     DISTANCE,
     FEATURES,
     LOOKS,
-    Appearance,
+    TOLD_SD,
     Bank,
     Crossing,
     ImageDetections,
@@ -66,7 +66,7 @@ def passing(images=600, closest=0.0, noise=0.0, seed=0):
 
 
 def looking(crossing, separation):
-    return Appearance(separation * crossing.boat[:, None].astype(float), np.ones(1))
+    return separation * crossing.boat[:, None] * TOLD_SD
 
 
 def test_two_far_apart_are_two_tracks_without_a_mistake():
@@ -155,10 +155,10 @@ def test_detections_are_dressed_from_their_own_vessel():
     crossing = passing(images=50)
     looks = [np.array([[1.0, 1, 1], [2, 2, 2]]), np.empty((0, 3))]
     found = dressed(crossing, looks, 3)
-    own = found.features[crossing.boat == 0]
+    own = found[crossing.boat == 0]
     assert set(own[:, 0]) == {1.0, 2.0}
     assert (own == own[:, :1]).all(), "the features of one image stay together"
-    assert np.isnan(found.features[crossing.boat == 1]).all()
+    assert np.isnan(found[crossing.boat == 1]).all()
 
 
 @pytest.mark.slow

@@ -78,8 +78,8 @@ def test_flights_that_agree_and_decide_nothing_are_said_to_be_few(report, flight
 def test_a_difference_says_which_sign_is_claimed(report, kind, claimed):
     first, second = np.array([1.0, 2.0, 4.0]), np.array([2.0, 1.5, 1.0])
     checks = {
-        "larger": Check.larger(first, second),
-        "smaller": Check.smaller(first, second),
+        "larger": Check(true=first > second, first=first, second=second),
+        "smaller": Check(true=first < second, first=first, second=second),
         "measured": Check(measured=first / second, first=first, second=second),
     }
     claims = claims_of("a", threshold=1.0)

@@ -11,8 +11,10 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from wildlab.studies.crossing_vessels import (
-    TUNING,
-    Appearance,
+    ACCELERATION,
+    MEASURED_M,
+    TOLD_SD,
+    VELOCITY_0,
     ImageDetections,
     feature_distances,
     image_features,
@@ -35,15 +37,15 @@ def test_of_one_target_it_is_the_single_filter():
     assert np.isnan(bank.x[0]).all()
     motion = partial(
         in_steps,
-        motion=partial(constant_velocity, sd_acceleration=TUNING.acceleration),
+        motion=partial(constant_velocity, sd_acceleration=ACCELERATION),
         longest=1.001 * INTERVAL,
     )
     first = Start(
         image[0] * INTERVAL,
         np.r_[z[0], 0, 0],
-        np.diag([TUNING.measurement**2] * 2 + [TUNING.velocity_0**2] * 2),
+        np.diag([MEASURED_M**2] * 2 + [VELOCITY_0**2] * 2),
     )
-    R = TUNING.measurement**2 * np.eye(2)
+    R = MEASURED_M**2 * np.eye(2)
     single = run_filter(image[1:] * INTERVAL, z[1:], R, positions(), motion, first)
     assert np.allclose(bank.x[1:, 0], single.x, atol=1e-9)
     assert np.allclose(bank.P[1:, 0], single.P, atol=1e-9)
@@ -70,16 +72,16 @@ def test_what_looks_alike_goes_together_and_the_gate_is_of_the_distance_alone():
     """Two tracks that keep the mean of two first looks each; then both detections lie between the two."""
     image = np.array([1, 1, 2, 2, 3, 3])
     z = np.array([[0, 0], [40, 0], [0, 0], [40, 0], [18, 0], [22, 0]], float)
-    looks = Appearance(np.array([[0.0], [10], [2], [12], [11], [1]]), np.ones(1))
+    size = np.array([TOLD_SD[0], 0, 0])
+    looks = np.outer([0.0, 10, 2, 12, 11, 1], size)
     assert run_bank(ImageDetections(image, z, INTERVAL)).track.tolist() == [0, 1, 0, 1, 0, 1]
     assert run_bank(ImageDetections(image, z, INTERVAL), looks).track.tolist() == [0, 1, 0, 1, 1, 0]
     far = z + np.array([[0.0, 0]] * 4 + [[0, 500]] * 2)
     assert run_bank(ImageDetections(image, far, INTERVAL), looks).track[4:].tolist() == [-1, -1]
     # What is kept is the mean, 1 and 11, as uncertain as half of a look.
-    alike = looks._replace(features=np.array([[0.0], [10], [2], [12], [6.06], [6]]))
+    alike = np.outer([0.0, 10, 2, 12, 6.06, 6], size)
     assert run_bank(ImageDetections(image, z, INTERVAL), alike).track[4:].tolist() == [1, 0]
-    alike = alike._replace(sd=np.array([1.5**0.25]))
-    assert run_bank(ImageDetections(image, z, INTERVAL), alike).track[4:].tolist() == [0, 1]
+    assert run_bank(ImageDetections(image, z, INTERVAL), alike / 1.5**0.25).track[4:].tolist() == [0, 1]
 
 
 values = arrays(np.float64, (3, 2), elements=st.floats(-50, 50))

@@ -202,7 +202,7 @@ def detect_images(request: DetectRequest, console: Console) -> dict[str, Any]:
             frames, request.out, request.method, thresholds, lambda done: tell(done, None)
         )
     judged = judge_detections(detected.detections, detected.frames, labels) if labels is not None else None
-    things = _as_found(detected.detections) if judged is None else judged.things
+    things = detected.detections.assign(verdict="detected") if judged is None else judged.things
     names = [str(one) for one in detected.frames["frame_id"]]
     with _progress(console, "drawing", None) as tell:
         pictures = write_pictures(
@@ -311,11 +311,6 @@ def samples_of(frames: Frames, labels: Labels) -> list[Sample]:
 
 def _labels(path: Path | None, request: DetectRequest) -> Labels | None:
     return None if path is None else read_labels(path, classes=request.classes, group=request.group)
-
-
-def _as_found(detections: pd.DataFrame) -> pd.DataFrame:
-    columns = ["frame_id", "left_px", "top_px", "width_px", "height_px", "score"]
-    return detections[columns].assign(verdict="detected")
 
 
 def _result(

@@ -686,7 +686,8 @@ def make_plan(wanted: PlanRequest, terrain: Terrain | None = None) -> Plan:
         outlines,
         distance,
         directions=directions(outlines, distance, wanted),
-        turn=_turn_length(wanted),
+        # What a turn costs, as metres of way: half a circle, or the time that one stands.
+        turn=math.pi * wanted.turn_radius_m if wanted.turn_radius_m > 0 else wanted.speed_m_s * wanted.turn_s,
         start=home,
         back=home is not None,
     )
@@ -780,8 +781,3 @@ def _home(home: tuple[float, float], areas: Areas) -> Array:
             field="--home",
         )
     return here
-
-
-def _turn_length(wanted: PlanRequest) -> float:
-    """What a turn costs, as metres of way: half a circle, or the time that one stands."""
-    return math.pi * wanted.turn_radius_m if wanted.turn_radius_m > 0 else wanted.speed_m_s * wanted.turn_s

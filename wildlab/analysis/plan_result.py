@@ -56,7 +56,9 @@ def plan_result(plan: Plan, covered: Sequence[Covered]) -> dict[str, Any]:
         "animal_pixels": round(view.pixels(wanted.camera, wanted.animal_m, plan.height), 2),
         "duration_s": round(plan.duration, 1),
         "nearest_ground_m": round(plan.nearest, 1),
-        "furthest_m": round(_furthest(plan), 1),
+        "furthest_m": round(
+            max(float(np.hypot(*(one.way.points - plan.home).T).max()) for one in plan.sorties), 1
+        ),
         "seen": round(seen_share(plan, covered), 4),
         "animals": _number(sum(living)),
         "expected_finds": _number(sum(found)),
@@ -268,10 +270,6 @@ def warnings(plan: Plan) -> list[Fact]:
     if any(len(area.holes) for area in plan.areas.areas):
         found.append(fact("holes"))
     return found
-
-
-def _furthest(plan: Plan) -> float:
-    return max(float(np.hypot(*(one.way.points - plan.home).T).max()) for one in plan.sorties)
 
 
 def _number(value: float) -> float | None:

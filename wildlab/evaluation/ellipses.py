@@ -113,16 +113,13 @@ def judge_ellipses(
         for _ in range(DRAWS)
     ]
     ends = np.sqrt(np.quantile(drawn, [(1 - PROBABILITY) / 2, (1 + PROBABILITY) / 2]) / bound)
-    ends = size * (ends / size) ** widening(np.log(np.maximum(squared, _LEAST)), group)
+    logarithms = np.log(np.maximum(squared, _LEAST))
+    ends = size * (ends / size) ** widening(logarithms, group)
     # No draw holds an error larger than was seen: six honest ellipses hold the truth all, half the time.
-    factor = Interval(size, float(ends[0]), max(float(ends[1]), _largest_factor(squared, group)))
+    # By the mean logarithm of all squared errors, were they normal.
+    most = np.exp((block_mean(logarithms, group).high - _MEAN_LOG) / 2)
+    factor = Interval(size, float(ends[0]), max(float(ends[1]), float(most)))
     return EllipseVerdict(_word(factor), coverage, factor, len(e))
-
-
-def _largest_factor(squared: Array, group: NDArray[np.intp]) -> float:
-    """High end of the factor's interval by the mean logarithm of all squared errors, were they normal."""
-    mean = block_mean(np.log(np.maximum(squared, _LEAST)), group)
-    return float(np.exp((mean.high - _MEAN_LOG) / 2))
 
 
 def is_overconfident(factor: Interval) -> bool:

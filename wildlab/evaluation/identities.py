@@ -57,15 +57,15 @@ class Moment(NamedTuple):
     """
 
     time: float
-    positions: ArrayLike
-    covariances: ArrayLike
+    positions: Array
+    covariances: Array
     identities: Sequence[Hashable]
-    truth: ArrayLike
+    truth: Array
     names: Sequence[Hashable]
-    visible: ArrayLike
-    ignored: ArrayLike
+    visible: NDArray[np.bool_]
+    ignored: NDArray[np.bool_]
     complete: bool = True
-    truth_sd: ArrayLike = 0.0
+    truth_sd: Array | float = 0.0
 
 
 class TargetLife(NamedTuple):
@@ -148,21 +148,6 @@ class Identities(NamedTuple):
     tracks: dict[Hashable, TrackLife]
 
 
-class _Checked(NamedTuple):
-    """A scan as arrays."""
-
-    time: float
-    x: Array
-    P: Array
-    identities: list[Hashable]
-    truth: Array
-    names: list[Hashable]
-    visible: NDArray[np.bool_]
-    ignored: NDArray[np.bool_]
-    complete: bool
-    truth_sd: Array
-
-
 def compare_identities(scans: Sequence[Moment], cutoff: float) -> Identities:
     """What became of tracks and targets over scans in the order of time.
 
@@ -200,7 +185,7 @@ def compare_identities(scans: Sequence[Moment], cutoff: float) -> Identities:
     >>> found.swaps, found.breaks, sorted(found.followed[-1].items())
     (2, 0, [('A', 8), ('B', 7)])
     """
-    given = [_checked(scan) for scan in scans]
+    given = [_arrays(scan) for scan in scans]
     times = np.array([one.time for one in given])
     if not len(given) or not np.isfinite(times).all() or (np.diff(times) < 0).any():
         raise WildlabError(
@@ -232,22 +217,20 @@ def compare_identities(scans: Sequence[Moment], cutoff: float) -> Identities:
     )
 
 
-def _checked(scan: Moment) -> _Checked:
+def _arrays(scan: Moment) -> Moment:
     x, truth = (np.asarray(points, float) for points in (scan.positions, scan.truth))
     size = max(points.shape[1] if points.ndim == 2 else 0 for points in (x, truth))
     x, truth = (points.reshape(0, size) if points.size == 0 else points for points in (x, truth))
     P = np.asarray(scan.covariances, float)
     P = P.reshape(0, size, size) if P.size == 0 else P
     visible, ignored = (np.asarray(flags, bool) for flags in (scan.visible, scan.ignored))
-    names, identities = list(scan.names), list(scan.identities)
-    sd = np.broadcast_to(np.asarray(scan.truth_sd, float), (len(truth),))
-    return _Checked(
-        float(scan.time), x, P, identities, truth, names, visible, ignored, bool(scan.complete),
-        sd,
+    return scan._replace(
+        positions=x, covariances=P, truth=truth, visible=visible, ignored=ignored,
+        truth_sd=np.broadcast_to(np.asarray(scan.truth_sd, float), (len(truth),)),
     )  # fmt: skip
 
 
-def _gospa(one: _Checked, cutoff: float) -> Gospa:
+def _gospa(one: Moment, cutoff: float) -> Gospa:
     """GOSPA of one scan, in which tracks on targets that nobody asks for cost nothing.
 
     The tracks are assigned to all targets as in `gospa`. Those on targets that are not visible or don't-care
@@ -255,12 +238,12 @@ def _gospa(one: _Checked, cutoff: float) -> Gospa:
     A target takes one track: a second one beside a don't-care target is a false one.
     """
     asked = one.visible & ~one.ignored
-    on = dict(_assign(one.x, one.truth, cutoff))
+    on = dict(_assign(one.positions, one.truth, cutoff))
     excused = {row for row, column in on.items() if not asked[column]}
     if not one.complete:
-        excused |= set(range(len(one.x))) - set(on)
-    kept = [row for row in range(len(one.x)) if row not in excused]
-    return gospa(one.truth[asked], one.x[kept], cutoff)
+        excused |= set(range(len(one.positions))) - set(on)
+    kept = [row for row in range(len(one.positions)) if row not in excused]
+    return gospa(one.truth[asked], one.positions[kept], cutoff)
 
 
 def _assign(x: Array, truth: Array, cutoff: float, kept: NDArray[np.bool_] | None = None) -> Pairs:
@@ -276,17 +259,17 @@ def _assign(x: Array, truth: Array, cutoff: float, kept: NDArray[np.bool_] | Non
     return list(zip(rows[made].tolist(), columns[made].tolist(), strict=True))
 
 
-def _follow(one: _Checked, before: dict[Hashable, Hashable], cutoff: float) -> Pairs:
+def _follow(one: Moment, before: dict[Hashable, Hashable], cutoff: float) -> Pairs:
     """The best pairs, the last one of each track being worth more."""
-    kept = np.zeros((len(one.x), len(one.truth)), bool)
+    kept = np.zeros((len(one.positions), len(one.truth)), bool)
     for row, identity in enumerate(one.identities):
         if identity in before:
             kept[row] = [name == before[identity] for name in one.names]
-    return sorted(_assign(one.x, one.truth, cutoff, kept))
+    return sorted(_assign(one.positions, one.truth, cutoff, kept))
 
 
 def _changes(
-    given: Sequence[_Checked], pairs: Sequence[Pairs]
+    given: Sequence[Moment], pairs: Sequence[Pairs]
 ) -> tuple[dict[Hashable, int], dict[Hashable, int]]:
     """Swaps and breaks by target."""
     names = [name for one in given for name in one.names]
@@ -308,7 +291,7 @@ def _changes(
 
 
 def _target_lives(
-    given: Sequence[_Checked],
+    given: Sequence[Moment],
     pairs: Sequence[Pairs],
     swaps: dict[Hashable, int],
     breaks: dict[Hashable, int],
@@ -338,7 +321,7 @@ def _target_lives(
     }
 
 
-def _track_lives(given: Sequence[_Checked], pairs: Sequence[Pairs]) -> dict[Hashable, TrackLife]:
+def _track_lives(given: Sequence[Moment], pairs: Sequence[Pairs]) -> dict[Hashable, TrackLife]:
     scans: dict[Hashable, int] = {}
     on: dict[Hashable, int] = {}
     errors: dict[Hashable, list[tuple[Array, Array, Array]]] = {}
@@ -349,9 +332,9 @@ def _track_lives(given: Sequence[_Checked], pairs: Sequence[Pairs]) -> dict[Hash
             identity = one.identities[row]
             on[identity] = on.get(identity, 0) + one.complete
             if not one.ignored[column]:
-                error = one.truth[column] - one.x[row]
-                own = one.truth_sd[column] ** 2 * np.eye(len(error))
-                errors.setdefault(identity, []).append((error, one.P[row], own))
+                error = one.truth[column] - one.positions[row]
+                own = np.take(one.truth_sd, column) ** 2 * np.eye(len(error))
+                errors.setdefault(identity, []).append((error, one.covariances[row], own))
     lives = {}
     for identity, count in scans.items():
         values, alone = _nees_of(errors.get(identity, []))

@@ -315,8 +315,8 @@ def independent_blocks(values: ArrayLike, blocks: ArrayLike, surely: float = 0.0
     return independent_count(_apart(values, blocks)[0], surely)
 
 
-def widening(values: ArrayLike, blocks: ArrayLike, probability: float = PROBABILITY) -> float:
-    """By which factor an interval is wider that takes all blocks for independent and many.
+def widening(values: ArrayLike, blocks: ArrayLike) -> float:
+    """By which factor a 90 % interval is wider that takes all blocks for independent and many.
 
     Parameters
     ----------
@@ -324,15 +324,13 @@ def widening(values: ArrayLike, blocks: ArrayLike, probability: float = PROBABIL
         (N,) without NaN.
     blocks
         (N,) which block each belongs to, in time order; two at least.
-    probability
-        Of the interval.
 
     Returns
     -------
     float
     """
     worth, count = independent_blocks(values, blocks), _apart(values, blocks)[1]
-    tail = (1 + probability) / 2
+    tail = (1 + PROBABILITY) / 2
     return float(np.sqrt(count / worth) * student_quantile(tail, worth - 1) / normal_quantile(tail))
 
 

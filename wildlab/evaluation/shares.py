@@ -7,7 +7,7 @@ little: of twenty, even all of them leave open whether it is nine in ten.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -18,7 +18,7 @@ from wildlab.errors import WildlabError
 from wildlab.evaluation.intervals import Interval, mean_interval, share_interval
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
 Array = NDArray[np.float64]
 
@@ -47,7 +47,7 @@ class Pooled(NamedTuple):
 
 @dataclass(frozen=True)
 class Check:
-    """What simulated flights give for a sentence; `Check.of` takes plain bools.
+    """What simulated flights give for a sentence.
 
     Attributes
     ----------
@@ -88,25 +88,6 @@ class Check:
     unit: str = ""
     by_threshold: Mapping[float, NDArray[np.bool_]] | None = None
     reach: tuple[float, float] = (-np.inf, np.inf)
-
-    @classmethod
-    def of(cls, given: Check | ArrayLike) -> Check:
-        """A check of what may be one already, or (N,) bools."""
-        return given if isinstance(given, cls) else cls(true=np.asarray(given, bool))
-
-    @classmethod
-    def smaller(
-        cls, first: Array, second: Array, unit: str = "", premise: NDArray[np.bool_] | None = None
-    ) -> Check:
-        """A check that is true where ``first`` is the smaller one."""
-        return cls(true=first < second, premise=premise, first=first, second=second, unit=unit)
-
-    @classmethod
-    def larger(
-        cls, first: Array, second: Array, unit: str = "", premise: NDArray[np.bool_] | None = None
-    ) -> Check:
-        """A check that is true where ``first`` is the larger one."""
-        return cls(true=first > second, premise=premise, first=first, second=second, unit=unit)
 
     def holds(self, threshold: float | None = None) -> NDArray[np.bool_]:
         """(N,) bool: of which flights the sentence is true, with that threshold.
@@ -150,11 +131,6 @@ class Check:
         if self.by_threshold is not None:
             return len(next(iter(self.by_threshold.values())))
         return len(self.true if self.true is not None else np.asarray(self.measured))
-
-
-def columns_of(runs: pd.DataFrame) -> Callable[[str, str], Array]:
-    """What gives (flights,) numbers by subject and name from a table with a row for each flight."""
-    return lambda subject, name: runs[subject, name].to_numpy(float)
 
 
 class Decision(NamedTuple):

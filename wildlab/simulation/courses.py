@@ -30,7 +30,6 @@ from wildlab.simulation.trajectory import (
     AttitudeDisturbance,
     Disturbance,
     FlightPath,
-    Motion,
     Signal,
     Trajectory,
     band_limited_disturbance,
@@ -228,14 +227,11 @@ def leg_headings(laps: Laps) -> Signal:
 def _flown(laps: Laps) -> tuple[Array, Array, Array]:
     """Times of the control points, how long into its lap each is, and when a lap's points are passed; s."""
     passed = lap_times(laps.course, laps.airspeed, np.subtract(laps.wind, laps.drift))
-    knots = _knots(laps.duration, laps.roll_time / _RISE)
+    # From some before 0 to some after the duration.
+    interval = laps.roll_time / _RISE
+    count = int(np.ceil(laps.duration / interval)) + 6 * (_DEGREE + 1)
+    knots = np.asarray(interval * (np.arange(count) - 3 * (_DEGREE + 1)), float)
     return knots, np.mod(knots + laps.start * passed[-1], passed[-1]), passed
-
-
-def _knots(duration: float, interval: float) -> Array:
-    """Times of the control points, s: from some before 0 to some after the duration."""
-    count = int(np.ceil(duration / interval)) + 6 * (_DEGREE + 1)
-    return np.asarray(interval * (np.arange(count) - 3 * (_DEGREE + 1)))
 
 
 def _smoothed(knots: Array, rough: Array, interval: float) -> BSpline:
@@ -549,7 +545,7 @@ def loiter_centre(twin: TwinParameters) -> Array:
     WildlabError
         Where the camera does not look down at the target's height there.
     """
-    there = _undisturbed_start(twin)
+    there = _along(twin, _circle(twin, np.zeros(2), 0.0), None)(np.zeros(1))
     camera = twin_manifest(twin, 0).geometry_camera()
     middle = [[twin.camera.width.number / 2, twin.camera.height.number / 2]]
     poses = CameraPoses(camera, true_mount(twin), there.position, there.R_nb)
@@ -561,12 +557,6 @@ def loiter_centre(twin: TwinParameters) -> Array:
             field="flight.altitude",
         )
     return np.asarray(-ground[:2])
-
-
-def _undisturbed_start(twin: TwinParameters) -> Motion:
-    """Where and how a loiter about the origin of n begins without control errors and gusts."""
-    path = _circle(twin, np.zeros(2), 0.0)
-    return _along(twin, path, None)(np.zeros(1))
 
 
 def _circle(

@@ -116,13 +116,6 @@ def feature_distances(measured: ArrayLike, stored: ArrayLike, sd: ArrayLike) -> 
     return np.asarray(np.nansum(apart**2, axis=-1))
 
 
-class Appearance(NamedTuple):
-    """What detections look like, (D, f), with spreads, (f,)."""
-
-    features: Array
-    sd: Array
-
-
 class Known(NamedTuple):
     """What is known of T tracks, by their numbers.
 
@@ -184,30 +177,6 @@ def pair_scans(
     return global_nearest(np.where(beyond**2 * distance <= gate, distance, np.inf), np.inf)
 
 
-class Tuning(NamedTuple):
-    """What the tracking system is given; standard deviations are per axis.
-
-    Attributes
-    ----------
-    measurement
-        m: of a measurement, and of the first position.
-    acceleration
-        m/s^2, of the process noise of constant velocity, H (6.2), held from image to image.
-    velocity_0
-        m/s, of the first velocity.
-    gate
-        On the normalised innovation squared, H (3.9).
-    max_speed
-        m/s: of a target from the first detection of a track to its second.
-    """
-
-    measurement: float
-    acceleration: float
-    velocity_0: float
-    gate: float
-    max_speed: float
-
-
 class ImageDetections(NamedTuple):
     """Images with detections, in order of time; D detections in all, image after image.
 
@@ -248,15 +217,15 @@ class Bank(NamedTuple):
     P: Array
 
 
-def run_bank(detections: ImageDetections, appearance: Appearance | None = None) -> Bank:
+def run_bank(detections: ImageDetections, looks: Array | None = None) -> Bank:
     """Track everything that was detected.
 
     Parameters
     ----------
     detections
         What was detected.
-    appearance
-        What the detections look like, to be weighed in; by distance alone where it is left out.
+    looks
+        (D, f) features of the detections, to be weighed in; by distance alone where they are left out.
 
     Returns
     -------
@@ -265,9 +234,9 @@ def run_bank(detections: ImageDetections, appearance: Appearance | None = None) 
     """
 
     motion = cache(partial(_motion, interval=detections.interval))
-    R = TUNING.measurement**2 * np.eye(2)
+    R = MEASURED_M**2 * np.eye(2)
     track = np.full(len(detections.image), -1)
-    features = np.empty((len(track), 0)) if appearance is None else appearance.features
+    features = np.empty((len(track), 0)) if looks is None else looks
     tracks = nobody(features.shape[1])
     images, firsts = np.unique(detections.image, return_index=True)
     started, states = list[int](), list[Known]()
@@ -279,14 +248,14 @@ def run_bank(detections: ImageDetections, appearance: Appearance | None = None) 
             x, P = predict(tracks.x, tracks.P, *motion(image - before))
             gap = z[:, None] - x[:, :2]
             distances = innovation_squared(gap, np.broadcast_to(P[:, :2, :2] + R, (*gap.shape, 2)))
-            if appearance is None:
-                chosen = global_nearest(distances, TUNING.gate)
+            if looks is None:
+                chosen = global_nearest(distances, GATE)
             else:
                 # What is stored is the mean of two, and as uncertain as half of a detection.
-                sd = np.sqrt(1.5) * appearance.sd
+                sd = np.sqrt(1.5) * TOLD_SD
                 seen = feature_distances(features[rows], tracks.stored, sd)
                 # The gate is one of the distance alone (H 6.4.4).
-                chosen = global_nearest(np.where(distances <= TUNING.gate, distances + seen, np.inf), np.inf)
+                chosen = global_nearest(np.where(distances <= GATE, distances + seen, np.inf), np.inf)
             one = np.flatnonzero(chosen.track >= 0)
             to = chosen.track[one]
             done = update(x[to], P[to], z[one], _H, R)
@@ -296,7 +265,7 @@ def run_bank(detections: ImageDetections, appearance: Appearance | None = None) 
         new = rows[free]
         if len(waiting) and image - before == 1 and len(new):
             old, z = detections.positions[waiting], detections.positions[new]
-            pairs = pair_scans(old, z, detections.interval, R, TUNING.max_speed, TUNING.gate)
+            pairs = pair_scans(old, z, detections.interval, R, MOST_SPEED, GATE)
             for first, at in zip(waiting, pairs.measurement, strict=True):
                 if at < 0:
                     continue
@@ -317,16 +286,16 @@ def run_bank(detections: ImageDetections, appearance: Appearance | None = None) 
 
 def _motion(images: int, interval: float) -> tuple[Array, Array]:
     """F and Q over so many images: noise is held over the time between two, as often as H predicted (6.2)."""
-    held = partial(constant_velocity, sd_acceleration=TUNING.acceleration)
+    held = partial(constant_velocity, sd_acceleration=ACCELERATION)
     return in_steps(images * interval, held, 1.001 * interval)
 
 
 def _start(z: Array, features: Array, step: tuple[Array, Array]) -> Known:
     """On the first of two positions with zero speed (H 6.2.4), updated with the second."""
     x = np.concatenate([z[0], np.zeros(2)])
-    P = np.diag([TUNING.measurement**2] * 2 + [TUNING.velocity_0**2] * 2)
+    P = np.diag([MEASURED_M**2] * 2 + [VELOCITY_0**2] * 2)
     x, P = predict(x, P, *step)
-    done = update(x, P, z[1], _H, TUNING.measurement**2 * np.eye(2))
+    done = update(x, P, z[1], _H, MEASURED_M**2 * np.eye(2))
     parts = done.x, done.P, features.mean(axis=0)
     return Known._make(part[None] for part in parts)
 
@@ -340,12 +309,10 @@ Numbers = dict[tuple[str, str], float]
 BOATS = ("boat 1", "boat 2")
 #: H 6.4.4; the gate is of 99 %, of the 95 to 99 % of H 3.3, and the largest speed, which serves the start
 #: alone, the deviation of the first velocity. Both are chosen.
-TUNING = Tuning(
-    measurement=17.5, acceleration=0.2, velocity_0=5.0, gate=gate_threshold(0.99, 2), max_speed=5.0
-)
+MEASURED_M, ACCELERATION, VELOCITY_0, GATE, MOST_SPEED = 17.5, 0.2, 5.0, gate_threshold(0.99, 2), 5.0
 #: Apart again are vessels twice the measurement noise from each other; how a crossing went is seen in the two
 #: minutes from then on, several laps, and how it ended in the last two. Chosen.
-APART_M, WINDOW_S = 2 * TUNING.measurement, 120.0
+APART_M, WINDOW_S = 2 * MEASURED_M, 120.0
 
 
 class Crossing(NamedTuple):
@@ -443,15 +410,15 @@ def photograph(twin: str, seed: int, flight: Flight, images: int) -> list[Array]
     return [np.array(rows, float).reshape(-1, len(NAMES)) for rows in found]
 
 
-def dressed(crossing: Crossing, looks: list[Array], seed: int) -> Appearance:
-    """Each detection looks like one of those rendered of its vessel, drawn with replacement."""
+def dressed(crossing: Crossing, looks: list[Array], seed: int) -> Array:
+    """Features (D, 3): a detection looks like one of those rendered of its vessel, with replacement."""
     rng = stream(seed, "looks of the detections")
     features = np.full((len(crossing.boat), len(NAMES)), np.nan)
     for number, pool in enumerate(looks):
         own = np.flatnonzero(crossing.boat == number)
         if len(pool):
             features[own] = pool[rng.integers(len(pool), size=len(own))]
-    return Appearance(features, TOLD_SD)
+    return features
 
 
 def wrong_of(crossing: Crossing, track: Index, started: Index) -> NDArray[np.bool_]:
@@ -582,8 +549,7 @@ def fly(seed: int, twin: str, images: int, flight: Flight | None = None) -> Flow
     """One simulated flight through every rule; ``flight`` where it is at hand."""
     flight = flight or simulate_twin(twin, seed, ("imu", "gnss"))
     crossing, looks = gather(flight), photograph(twin, seed, flight, images)
-    appearance = dressed(crossing, looks, seed)
-    rules = {DISTANCE: None, FEATURES: appearance}
+    rules = {DISTANCE: None, FEATURES: dressed(crossing, looks, seed)}
     banks = {name: run_bank(crossing.detections, how) for name, how in rules.items()}
     return Flown(crossing, looks, banks)
 

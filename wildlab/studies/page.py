@@ -483,8 +483,9 @@ def show_page(
         report.figures([wording.captioned(one.text, one.fig, one.name) for one in others[i : i + 2]])
     report.limits([wording.say(one) for one in texts.limits])
     report.section("Details")
-    if decided is not None and len(decided):
-        _premises(report, decided)
+    if decided is not None and len(decided) and decided[["premise", "threshold"]].astype(bool).any(axis=None):
+        columns = {name: CLAIM_COLUMNS[name] for name in ("claim", "premise", "threshold")}
+        report.table(decided, columns=columns, fold="Premises and thresholds of the claims")
     for key, frame in ordered:
         if not texts.tables[key].open:
             wording.table(key, frame)
@@ -525,12 +526,6 @@ def _claims(report: Report, decided: pd.DataFrame | None) -> None:
             for one, row in zip(report.claims, decided.to_dict("records"), strict=True)
         }
     report.claims_in_sight("Claims of the thesis", effects)
-
-
-def _premises(report: Report, decided: pd.DataFrame) -> None:
-    if (decided["premise"].astype(bool) | decided["threshold"].astype(bool)).any():
-        columns = {name: CLAIM_COLUMNS[name] for name in ("claim", "premise", "threshold")}
-        report.table(decided, columns=columns, fold="Premises and thresholds of the claims")
 
 
 def show_twins(report: Report, twins: Sequence[str], study: str) -> None:

@@ -25,7 +25,6 @@ from wildlab.detection.floating import (
     find_objects,
 )
 from wildlab.errors import WildlabError
-from wildlab.evaluation.shares import Check, Pooled
 from wildlab.flight.store import Flight
 from wildlab.geometry.covariances import inside_ellipse
 from wildlab.geometry.frames import Array, Indices, Mask
@@ -539,11 +538,6 @@ def trial(seed: int, *, twin: str, second: str, images: int) -> dict[tuple[str, 
                 file=name,
             )
     return numbers_of(*tally(rendered, FloatingThresholds()))
-
-
-def _share(check: Check) -> float:
-    count, of = check.pooled or Pooled(0, 0)
-    return count / of if of else 0.0
 
 
 def thresholds_table(thresholds: FloatingThresholds) -> pd.DataFrame:
