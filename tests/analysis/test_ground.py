@@ -10,9 +10,10 @@ from scipy.ndimage import gaussian_filter
 
 from tests.analysis.building import manifest_of, poses_table, surveyed
 from wildlab.analysis.accuracy import judge_accuracy
-from wildlab.analysis.georeference import georeference, observe, truth_deviations
+from wildlab.analysis.georeference import georeference, observe
 from wildlab.analysis.tracks.pixels import read_pixels
 from wildlab.flight.checks.check import check_flight
+from wildlab.flight.clocks import truth_deviations
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses

@@ -113,6 +113,11 @@ def test_a_cause_that_another_explains_as_well_does_not_count():
     assert not found.counts and found.inseparable == ("boresight", "clock", "height")
     assert page.cause_message(found).key == "cause-inseparable"
     assert page.cause_message(found).values["others"] == page.words_of_causes(["clock"])
+    # Two of the same causes are one.
+    other = model(["clock"], with_=2.2)
+    assert page.cause_message(diagnosis(MOST, rival, other, rivals=(rival, other))).values["others"] == (
+        page.words_of_causes(["clock"])
+    )
     # The table has every model that the sentence names, however many are likelier.
     likelier = [model([f"c{k}"], with_=1.0 + 0.01 * k) for k in range(tables.SHOWN)]
     shown = tables.models_table(diagnosis(MOST, *likelier, rival, both, rivals=(rival, both)))

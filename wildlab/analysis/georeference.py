@@ -12,13 +12,20 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
 
 from wildlab.analysis import Fact, fact
 from wildlab.errors import WildlabError
 from wildlab.evaluation.intervals import time_blocks
 from wildlab.files import write_atomic, write_csv
-from wildlab.flight.clocks import frame_times, gimbal_angles, gimbal_at, pose_finder, poses_at, truth_at
+from wildlab.flight.clocks import (
+    frame_times,
+    gimbal_angles,
+    gimbal_at,
+    pose_finder,
+    poses_at,
+    truth_at,
+    truth_deviations,
+)
 from wildlab.flight.schema import POSITION
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera_poses import CameraPoses
@@ -354,18 +361,6 @@ def truth_of(flight: Flight, table: pd.DataFrame) -> Array:
     targets, where = truth_at(flight.truth, times, offset)
     at = pd.Index(targets).get_indexer(pd.Index(table["target_id"]))
     return np.where((at >= 0)[:, None], where[at, np.arange(len(at))], np.nan)
-
-
-def truth_deviations(flight: Flight, names: ArrayLike) -> Array:
-    """Standard deviations (N,), m, of each axis of the true places of targets (N,), by name.
-
-    The median of what the truth states of a target, as for its tracks; zero where it states nothing.
-    """
-    truth = flight.table("truth")
-    if "sd_horizontal_m" not in truth:
-        return np.zeros(np.shape(names))
-    stated = truth.groupby("target_id")["sd_horizontal_m"].median()
-    return stated.reindex(np.asarray(names, str)).fillna(0.0).to_numpy(float)
 
 
 def ground_facts(observations: Observations, points: pd.DataFrame) -> list[Fact]:

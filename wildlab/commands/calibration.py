@@ -204,8 +204,8 @@ def clock(
     from wildlab.flight.manifest import replace_in_manifest
     from wildlab.flight.store import save_flight
 
-    change = {"clocks": {"camera_offset_s": round(float(str(said["offset_s"])), 4)}}
-    changed = replace(loaded, manifest=replace_in_manifest(loaded.manifest, change))
+    own = {"camera_offset_s": round(float(str(said["offset_s"])), 4), "camera_set": True}
+    changed = replace(loaded, manifest=replace_in_manifest(loaded.manifest, {"clocks": own}))
     save_flight(changed, flight, overwrite=True)
     click.echo(f'Next: wildlab check "{shown(flight)}"', err=True)
 

@@ -79,7 +79,8 @@ def import_(
     A recipe (.toml) says the same of plain tables: see data/recipes/README.md, which `wildlab doctor` finds.
     With --calibration, what was learnt on another flight is kept with this one and applied when it is
     evaluated. With --terrain, pixels are put on the ground of an elevation map; it must say what its heights
-    count from, or you do with --terrain-heights. --json goes with --dry-run.
+    count from, or you do with --terrain-heights. --json goes with --dry-run. A flight that contradicts itself
+    is written, to be looked at; the exit code of a problem is 2.
 
     \b
     Examples:
@@ -107,7 +108,6 @@ def import_(
         from wildlab.flight.importing import import_flight
 
         _report(import_flight(raw[0], source, out, overwrite, calibration, terrain), out)
-        click.echo(f'Next: wildlab check "{shown(out)}"', err=True)
         return
     card = _card(raw, out, wishes)
     _say(card, as_json)
@@ -117,16 +117,22 @@ def import_(
         return
     from wildlab.flight.card import import_card, recipe_beside
 
-    _report(import_card(card, out, overwrite, calibration, terrain), out)
-    click.echo(f'What was decided stands in "{shown(recipe_beside(out))}"; change it, and then:', err=True)
+    flight = import_card(card, out, overwrite, calibration, terrain)
     again = f'wildlab import "{shown(recipe_beside(out))}" --source "{shown(card.source)}"'
-    click.echo(f'  {again} --out "{shown(out)}" --overwrite', err=True)
-    click.echo(f'Next: wildlab check "{shown(out)}"', err=True)
+    _report(
+        flight, out,
+        f'What was decided stands in "{shown(recipe_beside(out))}"; change it, and then:',
+        f'  {again} --out "{shown(out)}" --overwrite',
+    )  # fmt: skip
 
 
-def _report(flight: Flight, out: Path) -> None:
+def _report(flight: Flight, out: Path, *decided: str) -> None:
     click.echo(shown(out))
-    tell_contradictions(flight)
+    problem = tell_contradictions(flight)
+    for line in (*decided, f'Next: wildlab check "{shown(out)}"'):
+        click.echo(line, err=True)
+    if problem:
+        sys.exit(2)
 
 
 def _card(raw: tuple[Path, ...], out: Path | None, wishes: dict[str, Any]) -> Proposal:

@@ -78,12 +78,14 @@ def terminal_console() -> Console:
     return Console(stderr=True)
 
 
-def tell_contradictions(flight: Flight) -> None:
-    """Say in what a flight contradicts itself, beside what is written."""
+def tell_contradictions(flight: Flight) -> bool:
+    """Say in what a flight contradicts itself, beside what is written; whether a problem is among it."""
     from wildlab.flight.checks.check import sense_sentences
 
-    for line in sense_sentences(flight):
+    lines = sense_sentences(flight)
+    for line in lines:
         click.echo(line, err=True)
+    return any(line.startswith("problem") for line in lines)
 
 
 #: By the keys of `TerrainSays`: kind, and what it says.

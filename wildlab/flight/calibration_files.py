@@ -224,11 +224,12 @@ def write_calibration(calibration: CameraFile | Learnt, path: Path) -> None:
 
 
 def without_own_clock(manifest: Manifest, learnt: Learnt) -> Learnt:
-    """A calibration less its clock where a flight states another offset than the one it was learnt on: what a
-    flight states was found on itself. Zones are no such offset."""
+    """A calibration less its clock where a flight's own is set, or is stated to be off by another amount than
+    where it was learnt: what a flight states was found on itself. Zones are no such offset."""
     apart = manifest.clocks.camera_offset_s - learnt.learnt_on.camera_offset_s
+    own = manifest.clocks.camera_set or abs(beside_zone(apart)) >= SAME_CLOCK_S
     kept = [i for i, one in enumerate(learnt.parameter) if one.name != "clock"]
-    if abs(beside_zone(apart)) < SAME_CLOCK_S or len(kept) == len(learnt.parameter):
+    if not own or len(kept) == len(learnt.parameter):
         return learnt
     covariance = np.array(learnt.covariance)[np.ix_(kept, kept)].tolist()
     update = {"parameter": tuple(learnt.parameter[i] for i in kept), "covariance": covariance}

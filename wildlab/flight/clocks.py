@@ -335,6 +335,18 @@ def truth_at(truth: pd.DataFrame, times: ArrayLike, offset_s: float = 0.0) -> tu
     return [str(name) for name in names], where
 
 
+def truth_deviations(flight: Flight, names: ArrayLike) -> Array:
+    """Standard deviations (N,), m, of each axis of the true places of targets (N,), by name.
+
+    The median of what the truth states of a target; zero where it states nothing.
+    """
+    truth = flight.table("truth")
+    if "sd_horizontal_m" not in truth:
+        return np.zeros(np.shape(names))
+    stated = truth.groupby("target_id")["sd_horizontal_m"].median()
+    return stated.reindex(np.asarray(names, str)).fillna(0.0).to_numpy(float)
+
+
 def longest_gap(stamps: ArrayLike) -> float:
     """The longest stretch in seconds between stamps (N,) of a log that its own rate explains."""
     steps = np.diff(np.asarray(stamps, float))

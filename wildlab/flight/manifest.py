@@ -135,9 +135,11 @@ class TimePart(Strict):
 
 
 class ClocksPart(Strict):
-    """What to add to a stamp of each clock to get flight time. The raw stamps are never rewritten."""
+    """What to add to a stamp of each clock to get flight time. The raw stamps are never rewritten.
+    `camera_set`: that of the camera is of this very flight, as `wildlab clock --set` leaves it."""
 
     camera_offset_s: float = 0.0
+    camera_set: bool | None = None
     truth_offset_s: float = 0.0
     gnss_offset_s: float = 0.0
 

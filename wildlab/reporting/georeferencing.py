@@ -112,12 +112,16 @@ def worst_sightings(flight: Flight, scored: pd.DataFrame) -> pd.DataFrame:
 
 
 def simplest_rivals(diagnosis: Diagnosis) -> list[int]:
-    """Numbers of the rivals that hold no other rival, the two of the least held-out error at most."""
+    """Numbers of the rivals that hold no other rival, the two of the least held-out error at most; of those
+    with the same causes, one."""
     models, winner = diagnosis.models, diagnosis.winner
     rivals = [m for m in diagnosis.ranked.rivals if models[m].causes not in ((), winner.causes)]
     held = [set(models[m].causes) for m in rivals]
-    simple = [m for m in rivals if not any(one < set(models[m].causes) for one in held)]
-    return sorted(simple, key=lambda m: models[m].gain.with_)[:2]
+    simple: dict[tuple[str, ...], int] = {}
+    for m in sorted(rivals, key=lambda m: models[m].gain.with_):
+        if not any(one < set(models[m].causes) for one in held):
+            simple.setdefault(models[m].causes, m)
+    return [*simple.values()][:2]
 
 
 def models_table(diagnosis: Diagnosis) -> pd.DataFrame:

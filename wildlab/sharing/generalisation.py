@@ -422,8 +422,9 @@ def generalise(flight: Flight, treatment: Treatment, name: str = "flight") -> Ge
     cell = None if treatment.cell_deg is None else cell_of(lat, lon, treatment.cell_deg, reach(flight, shift))
     there = NOWHERE if cell is None else (cell.latitude_deg, cell.longitude_deg)
     names = learn_names(flight.nav, flight.tables, manifest.sensors)
-    clocks = {key: beside_zone(value) for key, value in manifest.clocks.model_dump().items()}
-    folded = {key: value - clocks[key] for key, value in manifest.clocks.model_dump().items()}
+    offsets = manifest.clocks.model_dump(exclude={"camera_set"})
+    clocks = {key: beside_zone(value) for key, value in offsets.items()}
+    folded = {key: value - clocks[key] for key, value in offsets.items()}
     start = first_stamp(flight)
     nav = {
         names.of("poses", source): _moved(rename_identifiers(table, names, "nav"), shift, start)
@@ -664,7 +665,7 @@ def _manifest(
         "kind": manifest.kind,
         "locations": {"sensitivity": "withheld"},
         "platform": {"name": "aircraft"},
-        "clocks": clocks,
+        "clocks": {**clocks, "camera_set": manifest.clocks.camera_set},
     }
 
 

@@ -130,6 +130,11 @@ def test_overwriting_takes_a_word(card, tmp_path):
     assert call(*arguments, "--overwrite").exit_code == 0
     assert recipe_beside(tmp_path / "flight").read_text(encoding="utf-8") == recipe
     assert load_flight(tmp_path / "flight").name == "flight"
+    # What contradicts itself is written, to be looked at, and no script goes on with it.
+    beside = recipe_beside(tmp_path / "flight")
+    beside.write_text(recipe.replace('looks = "forward"', 'looks = "down"'), encoding="utf-8")
+    again = call(beside, "--source", card, "--out", tmp_path / "flight", "--overwrite")
+    assert again.exit_code == 2 and load_flight(tmp_path / "flight").manifest.mount.looks == "down"
 
 
 @pytest.mark.parametrize(

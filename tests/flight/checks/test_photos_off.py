@@ -33,6 +33,13 @@ def test_a_flight_as_stated_has_no_photo_off(seed, clutter):
     assert off(watched(seed, clutter)) == []
 
 
+@pytest.mark.parametrize(("sd_m", "off"), [(np.nan, True), (4.0, False)])
+def test_a_mark_is_off_where_its_place_is_not_said_to_be_uncertain(sd_m, off):
+    flight = simulate(Survey(1, images=50, stated_deg=0.3, off={"M24": (8.0, 0.0)}))
+    flight.tables["truth"] = flight.table("truth").assign(sd_horizontal_m=sd_m)
+    assert any("one mark off" in one.causes for one in known_points(flight)) == off
+
+
 def test_one_wrong_of_two_detections_is_no_wrong_photo():
     flight = watched(1)
     detections = flight.table("detections")

@@ -43,7 +43,7 @@ from wildlab.flight.checks.findings import (
     thin,
     undo_in,
 )
-from wildlab.flight.clocks import frame_times, gimbal_angles, poses_at, truth_at
+from wildlab.flight.clocks import frame_times, gimbal_angles, poses_at, truth_at, truth_deviations
 from wildlab.flight.schema import POSITION
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera, normalise
@@ -90,8 +90,8 @@ class Sightings:
     points, image
         (M, N, 3): where the known point is, or M that it may be, in n; (N,) image, in the order of time.
     sd
-        (N, 4): expected standard deviations of the attitude (rad, the mean of its angles), the position (m),
-        and the click (px); and of the angle that is known least (rad).
+        (N, 4): expected standard deviations of the attitude (rad, the mean of its angles), the position less
+        the known point's (m), and the click (px); and of the angle that is known least (rad).
     origin
         Of frame n.
     looked
@@ -186,7 +186,7 @@ def sightings(flight: Flight, source: str) -> Sightings | None:
         uv=detections[["u_px", "v_px"]].to_numpy(float),
         **at._asdict(),
         image=number,
-        sd=_expected(flight, P, len(chosen)),
+        sd=_expected(flight, P, labels, len(chosen)),
         origin=manifest.origin_tuple(),
         looked=looked,
         labels=np.full(len(chosen), "", object) if labels is None else labels,
@@ -210,7 +210,7 @@ def _points(flight: Flight, times: Array, labels: NDArray[np.object_] | None) ->
     return there[pd.Index(names).get_indexer(pd.Index(labels)), np.arange(len(times))][None]
 
 
-def _expected(flight: Flight, P: Array | None, n: int) -> Array:
+def _expected(flight: Flight, P: Array | None, labels: NDArray[np.object_] | None, n: int) -> Array:
     stated = flight.manifest.uncertainty
     angles = [stated.tilt_deg, stated.tilt_deg, stated.heading_deg]
     turns = [USUAL_ATTITUDE if angle is None else np.radians(angle) for angle in angles]
@@ -224,6 +224,8 @@ def _expected(flight: Flight, P: Array | None, n: int) -> Array:
         sd[good, 0], sd[good, 1] = own[good, 3:].mean(axis=1), own[good, :3].mean(axis=1)
         sd[good, 3] = own[good, 3:].max(axis=1)
     sd[:, [0, 3]] = np.maximum(sd[:, [0, 3]], LEAST_ATTITUDE)
+    of_truth = truth_deviations(flight, flight.table("truth")["target_id"] if labels is None else labels)
+    sd[:, 1] = np.hypot(sd[:, 1], np.median(of_truth) if labels is None else of_truth)
     return sd
 
 
@@ -378,6 +380,8 @@ LEAP_S = (18.0, -18.0, 19.0, -19.0, 37.0, -37.0)
 #: A mount is off by a few degrees and no wrong meaning; beyond the second, a turn is one of the usual ones.
 TURNED_DEG, LARGEST_TURN_DEG = 5.0, 40.0
 ALLOWED_TURN = np.array([1.0] * 3 + [1e-6] * 3)
+#: Known points tell a clock where it makes them so much likelier (logarithm).
+TOLD = 10.0
 #: A lever arm is no longer than this, m.
 LONGEST_LEVER = 5.0
 
@@ -483,9 +487,11 @@ def camera_mistakes(flight: Flight, s: Sightings) -> Iterator[Mistake[Sightings]
     yield from places_in("truth", s.origin, "truth", "points")
     yield from shared_place_mistakes(s)
     yield from height_mistakes(s)
-    yield from turn_mistakes(s)
-    if flight.manifest.time.kind == "utc":
-        yield from clock_mistakes(s, flight.manifest.clocks.camera_offset_s)
+    timed = flight.manifest.time.kind == "utc"
+    late = best_of(lambda t: sighting_cost(s.shifted(t)), CLOCKS) if timed else 0.0
+    yield from turn_mistakes(s, late)
+    if timed:
+        yield from clock_mistakes(s, late, flight.manifest.clocks.camera_offset_s)
 
 
 def shared_place_mistakes(s: Sightings) -> Iterator[Mistake[Sightings]]:
@@ -647,9 +653,12 @@ def height_mistakes(s: Sightings) -> Iterator[Mistake[Sightings]]:
         )
 
 
-def turn_mistakes(s: Sightings) -> Iterator[Mistake[Sightings]]:
-    """A camera that is turned against its mount by a constant, as a tilt that was not stated."""
-    m = missed(s)
+def turn_mistakes(s: Sightings, late: float) -> Iterator[Mistake[Sightings]]:
+    """A camera that is turned against its mount by a constant, as a tilt that was not stated; beside its
+    likeliest clock, where known points tell that it is `late`: on one course both move points alike."""
+    m, other = missed(s), s.shifted(late)
+    if (sighting_cost(s) - sighting_cost(other)) * m.good.sum() > TOLD:
+        m = missed(other)
     e = constant_of(m, m.good, ALLOWED_TURN)[0][:3]
     size = np.degrees(np.linalg.norm(e))
     if not TURNED_DEG < size < LARGEST_TURN_DEG:
@@ -665,17 +674,17 @@ def turn_mistakes(s: Sightings) -> Iterator[Mistake[Sightings]]:
     yield mistake(one_row("constant-turn"), turned, fitted=True, **facts)
 
 
-def clock_mistakes(s: Sightings, offset_s: float) -> Iterator[Mistake[Sightings]]:
-    """A constant by which the camera's clock is late or early; `offset_s` is what the manifest has."""
+def clock_mistakes(s: Sightings, late: float, offset_s: float) -> Iterator[Mistake[Sightings]]:
+    """A constant by which the camera's clock is late or early: the likeliest one, leap seconds and zones;
+    `offset_s` is what the manifest has."""
 
     def clock(row: Any, by: float, fitted: bool = False, **facts: Any) -> Mistake[Sightings]:
         corrections = (shift_clock("camera_offset_s", by), shift_poses(s.source, -by))
         facts |= {"by": by, "offset": offset_s + by}
         return mistake(row, lambda x: x.shifted(by), *corrections, fitted=fitted, **facts)
 
-    by = best_of(lambda t: sighting_cost(s.shifted(t)), CLOCKS)
-    if abs(by) > 0.05:
-        yield clock(one_row("camera-clock"), by, fitted=True)
+    if abs(late) > 0.05:
+        yield clock(one_row("camera-clock"), late, fitted=True)
     for seconds in LEAP_S:
         yield clock(one_row("leap-seconds"), seconds)
     for hours in HOURS:
@@ -765,13 +774,10 @@ def _single(s: Sightings) -> Iterator[Finding]:
         far = (size > SINGLE * np.median(size[good])) & (size > SINGLE_EXPECTED)
         off = _off(far & (angle > most * least), names, good)
         if off and len(off) <= max(1, count // 5):
-            facts = {"source": s.source, "n": len(off), "which": [_turned(m, names, one) for one in off[:5]]}
+            misses = {one: np.degrees(np.nanmedian(m.angle[names == one])) for one in off[:5]}
+            which = [f"{one!r} ({number(miss)} deg)" for one, miss in misses.items()]
+            facts = {"source": s.source, "n": len(off), "which": which}
             yield Finding("warning", table, field, f"one-{what}-off", facts, (f"one {what} off",))
-
-
-def _turned(m: Missed, names: NDArray[np.object_], name: str) -> str:
-    angle = float(np.degrees(np.nanmedian(m.angle[names == name])))
-    return f"{name!r} ({number(angle)} deg)"
 
 
 def _off(far: Mask, names: NDArray[np.object_], good: Mask) -> list[str]:
