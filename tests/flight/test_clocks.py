@@ -20,6 +20,7 @@ from wildlab.flight.clocks import (
     frame_poses,
     frame_times,
     gimbal_angles,
+    gimbal_at,
     longest_gap,
     pose_finder,
     poses_at,
@@ -145,7 +146,8 @@ def test_gimbal_from_frames_from_its_log_or_fixed(make_flight):
         }
     )
     pan, tilt = gimbal_angles(flight)
-    np.testing.assert_allclose(np.degrees(pan), [170.0, 190.0, np.nan])
+    np.testing.assert_allclose(np.degrees(pan), [170.0, -170.0, np.nan])
+    np.testing.assert_allclose(np.degrees(gimbal_at(flight.gimbal, [2.25])), [[175.0], [np.degrees(0.125)]])
     np.testing.assert_allclose(tilt, [0.0, 0.625, np.nan])
     flight.tables["frames"] = flight.tables["frames"].assign(pan_rad=[0.1, 0.2, 0.3], tilt_rad=0.0)
     np.testing.assert_allclose(gimbal_angles(flight)[0], [0.1, 0.2, 0.3])

@@ -389,14 +389,25 @@ def _forward(L: Array, B: Array) -> None:
 
 
 @compiled
-def _backward(L: Array, B: Array) -> None:
-    """Replace B (n, K) by the inverse of the transposed lower factor times B."""
-    for i in range(L.shape[0] - 1, -1, -1):
-        for k in range(i + 1, L.shape[0]):
-            for c in range(B.shape[1]):
-                B[i, c] -= L[k, i] * B[k, c]
-        for c in range(B.shape[1]):
+def _invert(L: Array, B: Array) -> None:
+    """Write into B (n, n) the inverse of L L', L (n, n) a lower factor."""
+    n = L.shape[0]
+    for i in range(n):
+        for c in range(n):
+            B[i, c] = 1.0 if i == c else 0.0
+        for k in range(i):
+            for c in range(k + 1):
+                B[i, c] -= L[i, k] * B[k, c]
+        for c in range(i + 1):
             B[i, c] /= L[i, i]
+    for j in range(n):
+        for k in range(j + 1):
+            B[j, k] *= B[j, j] if k < j else B[j, k]
+        for i in range(j + 1, n):
+            for k in range(j + 1):
+                B[j, k] += B[i, j] * B[i, k]
+        for k in range(j):
+            B[k, j] = B[j, k]
 
 
 @compiled
@@ -419,7 +430,8 @@ def weigh_chain(
     rho
         (M - 1, D) correlation of what wanders from one image to the next, below 1.
     share
-        (D,) of the variance of these errors that wanders; the rest is each image's own.
+        (D,) of the variance of these errors that wanders; the rest is each image's own. Those with a rest
+        stand first.
 
     Returns
     -------
@@ -451,12 +463,14 @@ def weigh_chain(
                 T[m, j, c] += g0[j] * W[i, 0, c] + g1[j] * W[i, 1, c]
     # Each image's own part first: what is left over of its points then says something of what wanders.
     wanders, stays = np.sqrt(share), np.sqrt(1 - share)
-    A, across, left, before = np.empty((D, D)), np.empty((D, D)), np.empty((D, D)), np.zeros((D, D))
-    seen, carried = np.empty((D, K)), np.zeros((D, K))
+    S = (stays > 0).sum()
+    A, across, left, before = np.empty((S, S)), np.empty((S, D)), np.empty((D, D)), np.zeros((D, D))
+    seen, carried = np.empty((S, K)), np.zeros((D, K))
     for m in range(M):
-        for j in range(D):
+        for j in range(S):
             for k in range(D):
                 across[j, k] = stays[j] * information[m, j, k]
+            for k in range(S):
                 A[j, k] = across[j, k] * stays[k]
             A[j, j] += 1.0
             for c in range(K):
@@ -467,16 +481,17 @@ def weigh_chain(
         for j in range(D):
             for k in range(j + 1):
                 value = information[m, j, k]
-                for i in range(D):
+                for i in range(S):
                     value -= across[i, j] * across[i, k]
                 left[j, k] = wanders[j] * wanders[k] * value
                 left[k, j] = left[j, k]
             for c in range(K):
                 rest = T[m, j, c]
-                for i in range(D):
+                for i in range(S):
                     rest -= across[i, j] * seen[i, c]
                 T[m, D + j, c] = wanders[j] * rest
-        T[m, :D] = seen
+        T[m, :S] = seen
+        T[m, S:D] = 0.0
         for j in range(D):
             come = 1 / (1 - rho[m - 1, j] ** 2) if m > 0 else 1.0
             go = rho[m, j] ** 2 / (1 - rho[m, j] ** 2) if m < M - 1 else 0.0
@@ -489,10 +504,11 @@ def weigh_chain(
                 for c in range(K):
                     T[m, D + j, c] += q * carried[j, c]
         logarithm += _factorise(left)
+        _invert(left, before)
+        carried[:] = 0.0
+        for j in range(D):
+            for k in range(D):
+                for c in range(K):
+                    carried[j, c] += before[j, k] * T[m, D + k, c]
         _forward(left, T[m, D:])
-        carried[:] = T[m, D:]
-        _backward(left, carried)
-        before[:] = np.eye(D)
-        _forward(left, before)
-        _backward(left, before)
     return W, T, logarithm

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from wildlab.errors import WildlabError
 from wildlab.flight.schema import COVARIANCE_COLUMNS, POSITION, QUATERNION
 from wildlab.flight.store import Flight
-from wildlab.geometry.frames import Array, Indices, between_attitudes, quaternion_to_matrix
+from wildlab.geometry.frames import Array, Indices, between_attitudes, quaternion_to_matrix, wrap
 
 #: Stretches without a sample up to this long are bridged by interpolation, unless the caller says otherwise;
 #: longer ones where the log's own rate explains them, up to so many of its usual steps: none is missing.
@@ -294,8 +294,9 @@ def gimbal_angles(
 
 def gimbal_at(gimbal: pd.DataFrame, times: ArrayLike) -> tuple[Array, Array]:
     """Pan and tilt at flight times (N,) by the gimbal's table, radians, (N,) each; NaN where it has none."""
-    angles = np.unwrap(gimbal[["pan_rad", "tilt_rad"]].to_numpy(float), axis=0)
-    pan, tilt = between(gimbal["time_s"].to_numpy(float), angles, times, "gimbal").T
+    stamps, angles = gimbal["time_s"].to_numpy(float), gimbal[["pan_rad", "tilt_rad"]].to_numpy(float)
+    before, after, share = _rows_about(stamps, times, _longest(stamps, "gimbal"))
+    pan, tilt = (angles[before] + share[:, None] * wrap(angles[after] - angles[before])).T
     return pan, tilt
 
 
