@@ -218,8 +218,11 @@ def shifting_poses(observations: Observations) -> PosesAt:
     @lru_cache(maxsize=4)
     def at(shift: float) -> CameraPoses:
         p_nb, R_nb = find(times + shift)
+        poses = replace(observations.poses, p_nb=p_nb, R_nb=R_nb)
+        if flight.gimbal is None:
+            return poses
         pan, tilt = gimbal_angles(flight, times + shift, rows)
-        return replace(observations.poses, p_nb=p_nb, R_nb=R_nb, pan=pan, tilt=tilt)
+        return replace(poses, pan=pan, tilt=tilt)
 
     return at
 

@@ -37,7 +37,7 @@ from wildlab.flight.files import dump_toml, printable, read_toml
 from wildlab.flight.importing import import_flight
 from wildlab.flight.manifest import CameraPart, TerrainSays
 from wildlab.flight.readers.labels import note_of_kinds
-from wildlab.flight.readers.log import PARTS, RawLog, Stream
+from wildlab.flight.readers.log import PARTS, Stream
 from wildlab.flight.readers.photos import camera_of
 from wildlab.flight.schema import QUATERNION
 from wildlab.flight.store import Flight
@@ -142,8 +142,8 @@ class Proposal:
         self.streams = {
             key_of(one, part): stream
             for one, part in (*aboard, *others, *((one, "marks") for one in self.by_role["marks"]))
-            if one is not None and (stream := one.item.part(part)) is not None
-            if "latitude_deg" in stream.columns and stream.used.any()
+            if one is not None and "latitude_deg" in (stream := one.item.part(part)).columns
+            if stream.used.any()
         }
         before = len(self.notes)
         self.heights = self._choose_heights({key_of(one, part) for one, part in aboard if one is not None})
@@ -201,7 +201,7 @@ class Proposal:
         several = self.by_role[role]
 
         def rows(one: Choice) -> int:
-            return sum(int(part.used.sum()) for part in one.item.log.parts.values()) if one.item.log else 0
+            return sum(int(part.used.sum()) for part in one.item.log.parts.values())
 
         taken = max(several, key=rows, default=None)
         self.notes += [
@@ -238,7 +238,7 @@ class Proposal:
     def _state(self, of_heights: str) -> None:
         """What is so of the whole flight."""
         start, reference = self.wishes.start, self.heights.reference
-        vehicle = self.own.item.log.vehicle if self.own is not None and self.own.item.log else ""
+        vehicle = "" if self.own is None else self.own.item.log.vehicle
         self.data |= {
             "description": f"Logged by {vehicle}." if vehicle else "",
             "locations": {"sensitivity": "withheld"},
@@ -278,21 +278,21 @@ class Proposal:
 
     def _add_vehicle(self, own: Choice, receiver: bool) -> None:
         """What the vehicle's own log has: poses, and its sensors."""
-        if own.item.part("gnss") is not None and receiver:
+        if own.item.part("gnss") and receiver:
             self._add_satellites(own, "vehicle")
-        if own.item.part("poses") is not None:
+        if own.item.part("poses"):
             self._add_poses(own, "autopilot")
-        if own.item.part("imu") is not None:
+        if own.item.part("imu"):
             self.data["imu"] = {
                 **read_assumed("imu"),
                 **self._over_time(own, "imu", "vehicle-imu"),
                 "force": quantities("xyz", "f_{}_m_s2", "m/s2"),
                 "rate": quantities("xyz", "w_{}_rad_s", "rad/s"),
             }
-        if own.item.part("magnetometer") is not None:
+        if own.item.part("magnetometer"):
             block = self._over_time(own, "magnetometer", "vehicle-magnetometer")
             self.data["magnetometer"] = block | {"field": quantities("xyz", "field_{}_ut", "uT")}
-        if own.item.part("gimbal") is not None:
+        if own.item.part("gimbal"):
             self._add_gimbal(own)
 
     def _add_satellites(self, choice: Choice, name: str) -> None:
@@ -328,7 +328,7 @@ class Proposal:
     def _add_frames(self, images: Choice, lens: str | None, placed: bool) -> None:
         """The images, with the poses that stand in them."""
         photos, data, wishes, own = stream_of(images, "photos"), self.data, self.wishes, self.own
-        camera, how = camera_of(images.item.log or RawLog({}), wishes.camera, wishes.focal_px)
+        camera, how = camera_of(images.item.log, wishes.camera, wishes.focal_px)
         if camera is None:
             self._leave_out_images(how, "give --camera or --focal")
             return
@@ -353,7 +353,8 @@ class Proposal:
             return
         if records is not None and not clock.triggers and wishes.camera_offset_s is None:
             self.notes.append(f"{int(records[1].used.sum())} triggers fit no images for certain: not used.")
-        id_ = "stem" if len(set(_stems(photos))) == len(photos) else "file"
+        stems = {PurePosixPath(str(one)).stem for one in photos.columns["file"]}
+        id_ = "stem" if len(stems) == len(photos) else "file"
         file = self._table(images, "photos", "images")
         self.logs[file] |= {"triggers": clock.triggers} if clock.triggers else {}
         self.logs[file] |= {} if lens is None else {"camera": lens}
@@ -367,7 +368,7 @@ class Proposal:
         if clock.offset_s:
             data["clocks"] = {"camera_offset_s": clock.offset_s}
         data["frames"] = frames
-        if placed and (own is None or own.item.part("poses") is None):
+        if placed and (own is None or not own.item.part("poses")):
             end = angles(photos)
             data.setdefault("poses", {})["camera" if end == "_world_deg" else "images"] = {
                 "file": file,
@@ -380,8 +381,7 @@ class Proposal:
     def _records(self) -> tuple[str, Stream] | None:
         """The table of the triggers' records, where there are any, and its rows."""
         for one in (self.triggers, self.own):
-            stream = None if one is None else one.item.part("triggers")
-            if one is not None and stream is not None and has_utc(stream):
+            if one is not None and has_utc(stream := one.item.part("triggers")):
                 return self._table(one, "triggers", "triggers"), stream
         return None
 
@@ -407,7 +407,7 @@ class Proposal:
         """Truth: tracks of targets, and points that do not move."""
         truth = []
         for number, one in enumerate(self.by_role["target"], 1):
-            part = "gnss" if one.item.part("gnss") is not None else "poses"
+            part = "gnss" if one.item.part("gnss") else "poses"
             block = self._over_time(one, part, f"target-{number}")
             block |= {"target": one.target, "position": position()}
             truth.append(block | stated_spreads(stream_of(one, part)))
@@ -511,7 +511,7 @@ class Proposal:
 
 def _refuse_without_zone(choices: Sequence[Choice]) -> None:
     """A log whose clock states no zone may be the vehicle's own: none without an attitude takes its place."""
-    if any(one.role == "own" and one.item.part("poses") is not None for one in choices):
+    if any(one.role == "own" and one.item.part("poses") for one in choices):
         return
     for one in choices:
         if one.role == "nothing" and "without a zone" in one.why:
@@ -528,7 +528,7 @@ def _no_zone(choice: Choice) -> WildlabError:
 
 def _no_utc(choice: Choice) -> WildlabError:
     """What to state of a log that does not know UTC."""
-    if choice.item.log is not None and "zone" in choice.item.log.clock:
+    if "zone" in choice.item.log.clock:
         return _no_zone(choice)
     problem = f"the clock of {choice.item.shown} does not know UTC"
     return WildlabError(
@@ -549,10 +549,6 @@ def _comment(text: str) -> str:
     return "# " + re.sub(r"[\x00-\x1f\x7f\u0085\u2028\u2029]+", " ", text)
 
 
-def _stems(photos: Stream) -> list[str]:
-    return [PurePosixPath(str(one)).stem for one in photos.columns["file"]]
-
-
 def key_of(choice: Choice, part: str) -> str:
     """What a part of a file is called in sentences."""
     return f"{choice.item.name} ({part})"
@@ -567,7 +563,7 @@ def stream_of(choice: Choice, part: str) -> Stream:
         Where no row of it can be used, as where a role was stated that the file does not have the data for.
     """
     stream = choice.item.part(part)
-    if stream is None:
+    if not stream:
         raise WildlabError(
             f"{choice.item.shown} is no {choice.role!r}: it has no {PARTS_SHOWN.get(part, part)} to use",
             f"choose another role, or --role {choice.item.name}=nothing",
@@ -757,20 +753,19 @@ def sentences_of(choices: Sequence[Choice]) -> list[str]:
         notes.append(f"No logs by their endings, and not looked at: {', '.join(others[:3])}{more}")
     for one in choices:
         log, name = one.item.log, one.item.shown
-        own = [f"is not used: {printable(one.why)}"] if one.role == "nothing" or log is None else []
         if one.item.problem == OTHER:
             continue
-        if log is not None:
-            if not own:
-                own = [f"is taken for {ROLES[one.role]}{one.target and f', {one.target}'}: {one.why}"]
-            own = [log.vehicle and f"is of {log.vehicle}", *own]
-            # An image without a place is one all the same, and its reader says what it lacks.
-            own += [
-                _unused(part, rows)
-                for part, rows in log.parts.items()
-                if part != "photos" and not rows.used.all()
-            ]
-            own += [*log.lost, *log.notes]
+        role = f"is taken for {ROLES[one.role]}{one.target and f', {one.target}'}: {one.why}"
+        if one.role == "nothing" or one.item.problem:
+            role = f"is not used: {printable(one.why)}"
+        own = [log.vehicle and f"is of {log.vehicle}", role]
+        # An image without a place is one all the same, and its reader says what it lacks.
+        own += [
+            _unused(part, rows)
+            for part, rows in log.parts.items()
+            if part != "photos" and not rows.used.all()
+        ]
+        own += [*log.lost, *log.notes]
         notes += [f"{name}: {printable(text)}" for text in own if text]
     return notes
 

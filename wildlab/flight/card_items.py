@@ -43,6 +43,8 @@ OTHER = "is no log by its ending"
 TABLE = "a plain table"
 #: More files than any card of a day's flights has.
 MOST_FILES = 200_000
+#: Of what could not be read, or is not there.
+NO_LOG, NO_ROWS = RawLog({}), Stream({"use": np.empty(0)})
 
 
 @dataclass(frozen=True)
@@ -56,14 +58,14 @@ class CardItem:
     format
         As in `FORMATS` and `FOLDERS`; empty where none is known.
     log
-        As read, None where it could not be.
+        As read, empty where it could not be.
     problem
         Why not.
     """
 
     name: str
     format: str = ""
-    log: RawLog | None = None
+    log: RawLog = NO_LOG
     problem: str = ""
 
     @property
@@ -83,10 +85,10 @@ class CardItem:
             return FOLDERS[self.format].called
         return FORMATS[self.format].called if self.format else "not known"
 
-    def part(self, name: str) -> Stream | None:
-        """One part of the log, where it has one with a row that can be used; images count without a place."""
-        stream = None if self.log is None else self.log.parts.get(name)
-        return stream if stream is not None and (name == "photos" or stream.used.any()) else None
+    def part(self, name: str) -> Stream:
+        """One part of the log, without rows where none can be used; images count without a place."""
+        stream = self.log.parts.get(name, NO_ROWS)
+        return stream if name == "photos" or stream.used.any() else NO_ROWS
 
 
 def source_folder(paths: Sequence[Path]) -> Path:
@@ -309,8 +311,8 @@ def choose_roles(found: Sequence[CardItem], stated: Mapping[str, str]) -> list[C
 
 def _copies(found: Sequence[CardItem]) -> Iterator[tuple[CardItem, CardItem]]:
     """Files whose every row is in another one of the same format, a copy or a part of it; and that other."""
-    logs = [one for one in found if one.log is not None and one.log.parts.keys() & COPIED]
-    logs.sort(key=lambda one: sum(map(len, one.log.parts.values())) if one.log else 0, reverse=True)
+    logs = [one for one in found if one.log.parts.keys() & COPIED]
+    logs.sort(key=lambda one: sum(map(len, one.log.parts.values())), reverse=True)
     for number, one in enumerate(logs):
         whole = next((other for other in logs[:number] if _within(one, other)), None)
         if whole is not None:
@@ -318,7 +320,7 @@ def _copies(found: Sequence[CardItem]) -> Iterator[tuple[CardItem, CardItem]]:
 
 
 def _within(one: CardItem, other: CardItem) -> bool:
-    if one.format != other.format or one.log is None or other.log is None:
+    if one.format != other.format:
         return False
     for name, part in one.log.parts.items():
         whole = other.log.parts.get(name)
@@ -353,15 +355,15 @@ def _first(one: CardItem, stated: tuple[str, str] | None) -> Choice:
     """What needs no comparison; an empty role where it does."""
     if stated is not None:
         return Choice(one, stated[0], "as you said", stated[1])
-    if one.log is None:
+    if one.problem:
         return Choice(one, "nothing", one.problem)
     for part, role in (("photos", "images"), ("marks", "marks"), ("clicks", "clicks")):
-        if part in one.log.parts and one.part(part) is None:
+        if part in one.log.parts and not one.part(part):
             return Choice(one, "nothing", _useless(one))
         if part in one.log.parts:
             return Choice(one, role, f"it has {len(one.log.parts[part])} {PARTS_SHOWN[part]}")
-    if one.part("poses") is None and one.part("gnss") is None:
-        if one.part("triggers") is not None:
+    if not one.part("poses") and not one.part("gnss"):
+        if one.part("triggers"):
             why = f"it has {len(one.log.parts['triggers'])} records of triggers alone"
             return Choice(one, "triggers", why)
         return Choice(one, "nothing", _useless(one))
@@ -374,26 +376,26 @@ PARTS_SHOWN = {"photos": "images", "marks": "points", "clicks": "pixels"}
 
 def _useless(one: CardItem) -> str:
     """Why a log without a usable place has no role."""
-    if one.log is None or not one.log.parts:
+    if not one.log.parts:
         return "it holds nothing for a flight"
     reasons = [why for stream in one.log.parts.values() for why in stream.columns["why"] if why]
     common = max(set(reasons), key=reasons.count) if reasons else "it has no positions"
     return f"no row of it can be used: {common}"
 
 
-def _images(found: Sequence[CardItem], choices: Mapping[str, Choice]) -> CardItem | None:
-    """The folder with the most images."""
+def _images(found: Sequence[CardItem], choices: Mapping[str, Choice]) -> CardItem:
+    """The folder with the most images, nothing where there is none."""
     folders = [one for one in found if choices[one.key].role == "images"]
-    return max(folders, key=lambda one: len(one.log.parts["photos"]) if one.log else 0, default=None)
+    return max(folders, key=lambda one: len(one.part("photos")), default=CardItem(""))
 
 
-def _own(open_: Sequence[CardItem], images: CardItem | None, unread: bool) -> tuple[CardItem | None, str]:
+def _own(open_: Sequence[CardItem], images: CardItem, unread: bool) -> tuple[CardItem | None, str]:
     """The vehicle's own log, with the reason: what turns, covers the images, triggers, flies and climbs, in
     this order, and of those that are alike the longest. Where the images have poses of their own and no log
     turns, the one that was where they say that the camera was, or None; None, too, where none turns or is
     known to fly beside an unread table."""
-    turned = [one for one in open_ if any(one.part(part) is not None for part in ("poses", "gimbal"))]
-    if not turned and images is not None and has_place(images):
+    turned = [one for one in open_ if any(one.part(part) for part in ("poses", "gimbal"))]
+    if not turned and has_place(images):
         for one in open_:
             distance, above = _from_images(one, images)
             if _on_board(distance, above):
@@ -403,11 +405,11 @@ def _own(open_: Sequence[CardItem], images: CardItem | None, unread: bool) -> tu
         return None, ""  # the table may be the vehicle's
     if len(open_) == 1:
         return open_[0], "it is the only log"
-    taken = span_of(images, ["photos"]) if images is not None else None
+    taken = span_of(images, ["photos"])
     signs: dict[str, Callable[[CardItem], bool]] = {
         "has an attitude": lambda one: one in turned,
-        "covers the images": lambda one: taken is not None and _overlap(span_of(one), taken) > SHARED_S,
-        "has records of a camera's triggers": lambda one: one.part("triggers") is not None,
+        "covers the images": lambda one: _overlap(span_of(one), taken) > SHARED_S,
+        "has records of a camera's triggers": lambda one: bool(one.part("triggers")),
         "is of a vehicle that flies": _flies,
         "goes up and down by more than 15 m": lambda one: _climb(one) > ON_BOARD_M,
     }
@@ -425,15 +427,15 @@ _FLYING = re.compile(
 
 
 def _flies(one: CardItem) -> bool:
-    return one.log is not None and bool(_FLYING.search(f"{one.format} {one.log.vehicle}"))
+    return bool(_FLYING.search(f"{one.format} {one.log.vehicle}"))
 
 
 def _climb(one: CardItem) -> float:
     """From the lowest to the highest place of a log, m, without the outermost hundredths."""
     for part in ("poses", "gnss"):
         stream = one.part(part)
-        for name in () if stream is None else stream.columns:
-            if stream is not None and name.startswith("height_"):
+        for name in stream.columns:
+            if name.startswith("height_"):
                 heights = stream.columns[name][stream.used]
                 heights = heights[np.isfinite(heights)]
                 if len(heights):
@@ -444,15 +446,14 @@ def _climb(one: CardItem) -> float:
 def has_place(images: CardItem) -> bool:
     """Whether some image says where it was taken."""
     photos = images.part("photos")
-    return photos is not None and "latitude_deg" in photos.columns and bool(photos.used.any())
+    return "latitude_deg" in photos.columns and bool(photos.used.any())
 
 
-def _other(one: CardItem, own: CardItem | None, images: CardItem | None) -> Choice:
+def _other(one: CardItem, own: CardItem | None, images: CardItem) -> Choice:
     """A log that is not the vehicle's own."""
     if own is None:
         # By UTC, or else by the wall clock of their camera.
-        taken = None if images is None else span_of(images, ["photos"], ("time_s", "time_log_s"))
-        apart = -_overlap(span_of(one), taken)
+        apart = -_overlap(span_of(one), span_of(images, ["photos"], ("time_s", "time_log_s")))
         if apart > ZONES_S:
             why = f"it is of another time: {_lasting(apart)} lie between it and the images"
             return Choice(one, "nothing", why)
@@ -470,7 +471,7 @@ def _other(one: CardItem, own: CardItem | None, images: CardItem | None) -> Choi
     height = "" if math.isnan(above) else f" and {abs(above):.0f} m {'below' if above > 0 else 'above'}"
     if _on_board(distance, above):
         near = f"it is mostly within {distance:.1f} m of the vehicle's own log"
-        return Choice(one, "camera" if one.part("poses") is not None else "receiver", near)
+        return Choice(one, "camera" if one.part("poses") else "receiver", near)
     why = f"it is {distance:.0f} m beside{height} the vehicle (medians), for {_lasting(shared)} of its flight"
     return Choice(one, "target", why)
 
@@ -517,7 +518,7 @@ def way_of(one: CardItem, *stamped: tuple[str, str]) -> LoggedPath | None:
     """
     for name, time in stamped or (("gnss", "time_s"), ("poses", "time_s")):
         stream = one.part(name)
-        if stream is None or not {"latitude_deg", time} <= stream.columns.keys():
+        if not {"latitude_deg", time} <= stream.columns.keys():
             continue
         c = stream.columns
         place = np.radians(np.column_stack([c["latitude_deg"], c["longitude_deg"]]))
@@ -559,7 +560,7 @@ def span_of(
     """First and last stamp of the first part, by the first clock, that has some, s; of images all count."""
     for part, clock in product(parts, clocks):
         stream = one.part(part)
-        if stream is not None and clock in stream.columns:
+        if clock in stream.columns:
             times = stream.columns[clock] if part == "photos" else stream.columns[clock][stream.used]
             times = times[np.isfinite(times)]
             if len(times):
@@ -647,7 +648,7 @@ def one_camera(
     WildlabError
         Where no camera's name has what is wanted.
     """
-    if images.log is None or "photos" not in images.log.parts:
+    if "photos" not in images.log.parts:
         return images, None, ""
     named = Counter(str(one) for one in images.log.parts["photos"].columns.get("camera", ()))
     if len(named) < 2 and not wanted:
@@ -685,17 +686,16 @@ def clock_of_images(
     added to the stamps counts for more.
     """
     photos = images.part("photos")
-    columns: dict[str, NDArray[Any]] = {} if photos is None else photos.columns
-    utc, wall = (_known(columns.get(name)) for name in ("time_s", "time_log_s"))
-    if photos is not None and triggers is not None and stated_offset_s is None:
+    utc, wall = (_known(photos.columns.get(name)) for name in ("time_s", "time_log_s"))
+    if photos and triggers is not None and stated_offset_s is None:
         clock = _by_triggers(photos, *triggers)
         if clock is not None:
             return clock
-    if photos is None or not len(utc) + len(wall):
+    if not len(utc) + len(wall):
         return ImageClock("sequence", 0.0, "The images have no time.")
     offset = stated_offset_s or 0.0
     if len(utc):
-        base = images.log.clock if images.log is not None else ""
+        base = images.log.clock
         note = f"The images' stamps are {printable(base) if base.startswith('local') else 'in UTC'}."
         note += f" {offset:g} s are added to them, as you said." if offset else ""
         return ImageClock("utc", offset, note)

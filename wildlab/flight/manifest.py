@@ -525,6 +525,11 @@ class TargetsPart(Strict):
     identified: Literal["label", "gate", "one"] | None = None
     many: ManyTargetsPart | None = None
 
+    @property
+    def others(self) -> bool:
+        """Whether it is stated that targets are about whose places nobody knows."""
+        return self.many is not None and self.many.others
+
     @model_validator(mode="after")
     def _at_rest(self) -> TargetsPart:
         if self.start_speed_m_s == 0 and self.acceleration_m_s_sqrt_s != 0:

@@ -189,7 +189,12 @@ def confirmed_locations(folder: Path) -> LocationsPart:
         Where `flight.toml` cannot be read.
     """
     stated = read_manifest(inside(folder, FILE_NAME, file=folder, field=FILE_NAME)).checksums.get(STATED)
-    return next((one for one in _every_locations() if _of_places(one) == stated), LocationsPart())
+    categories = (None, 1, 2, 3, 4)
+    every = (
+        LocationsPart(sensitivity=sensitivity, category=own, agreed_category=agreed)
+        for sensitivity, own, agreed in product(get_args(Sensitivity), categories, categories)
+    )
+    return next((one for one in every if _of_places(one) == stated), LocationsPart())
 
 
 def locations_confirmed(folder: Path) -> bool:
@@ -203,12 +208,6 @@ def locations_confirmed(folder: Path) -> bool:
     """
     manifest = read_manifest(inside(folder, FILE_NAME, file=folder, field=FILE_NAME))
     return manifest.checksums.get(STATED, _of_places(LocationsPart())) == _of_places(manifest.locations)
-
-
-def _every_locations() -> Iterator[LocationsPart]:
-    categories = (None, 1, 2, 3, 4)
-    for sensitivity, own, agreed in product(get_args(Sensitivity), categories, categories):
-        yield LocationsPart(sensitivity=sensitivity, category=own, agreed_category=agreed)
 
 
 def _of_places(locations: LocationsPart) -> str:

@@ -402,7 +402,7 @@ def track_jointly(
         lasting_s,
         inputs.targets.reach_m if np.isfinite(inputs.targets.reach_m) else CUTOFF_M,
         truth_sd,
-        bool(stated.targets.many is not None and stated.targets.many.others),
+        stated.targets.others,
         unknown_correlation(stated, places, tuned),
         estimated,
     )

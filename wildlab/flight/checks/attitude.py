@@ -45,6 +45,7 @@ from wildlab.flight.checks.inertial import (
     increasing_rows,
     moves,
     samples,
+    trimmed_size,
 )
 from wildlab.flight.schema import FIELD, FORCE, POSITION, QUATERNION, RATE, VELOCITY, other_units
 from wildlab.flight.store import Flight
@@ -56,7 +57,8 @@ from wildlab.names import listed
 USUAL_RATE, RATE_SHARE, USUAL_FORCE, FORCE_SHARE = 0.03, 0.15, 0.8, 0.15
 #: Turns between attitudes: over at most so long (s), at most so many, and at least so many.
 STEP_S, MOST, ENOUGH = 0.5, 600, 30
-COUNTED = 0.97
+#: The largest of what is left do not count.
+_rms = partial(trimmed_size, counted=0.97)
 #: A correlation beyond this in either half is a sign, where so many intervals spread by so much (m/s^2).
 AGAINST, AGAINST_ENOUGH, LIVELY = 0.4, 100, 0.1
 #: Cosine between rates and turns of the attitude, over all, below which no unit makes one of the other.
@@ -157,12 +159,6 @@ def _felt_misfit(f: Felt) -> Misfit:
         return crosswise(len(left), 10, lambda _, judged: (_rms(left[judged]) / usual,))
 
     return np.concatenate([judge(rate, usual_rate), judge(f.force - expected, usual_force)])
-
-
-def _rms(values: Array) -> float:
-    length = np.sort(np.linalg.norm(values[np.isfinite(values).all(axis=1)], axis=1))
-    counted = length[: max(1, int(COUNTED * len(length)))]
-    return float(np.sqrt(np.mean(counted**2))) if len(length) else np.inf
 
 
 def forces(flight: Flight) -> Iterator[Finding]:
@@ -457,8 +453,8 @@ def heading(flight: Flight) -> Iterator[Finding]:
             continue
         R, velocity, acceleration = given
         course = np.angle(velocity)
-        before, leant = follows(R, course), leans(R, acceleration)[0]
-        apart = leans(R, acceleration, velocity)
+        before, leant = follows(R, course), leaning_of(R, acceleration)[0, 0]
+        apart = leaning_of(R, acceleration, velocity)[0]
         aside = before < APART and np.abs(np.exp(1j * course).mean()) <= STRAIGHT
         turned: list[tuple[float, Mistake[Array]]] = []
         leaning: list[tuple[float, Mistake[Array]]] = []
@@ -467,7 +463,8 @@ def heading(flight: Flight) -> Iterator[Finding]:
             if undone is None:
                 continue
             after = follows(undone, course)
-            if aside and after >= FOLLOWS and leans(undone, acceleration)[0] > max(LEANS, leant + LEANS / 2):
+            right = leaning_of(undone, acceleration)[0, 0] > max(LEANS, leant + LEANS / 2)
+            if aside and after >= FOLLOWS and right:
                 turned.append((after, one))
             if apart.max() < LEANS / 2 and (after >= FOLLOWS or before < FOLLOWS):
                 lean, size = leaning_of(undone, acceleration, velocity)
@@ -513,11 +510,6 @@ def headed(nav: pd.DataFrame) -> tuple[Array, Complex, Complex] | None:
 def follows(R: Array, course: Array) -> float:
     """Mean cosine of the angle between heading and course: one where the nose points where it goes."""
     return float(np.mean(np.cos(matrix_to_euler(R)[:, 2] - course)))
-
-
-def leans(R: Array, acceleration: Complex, *others: Complex) -> Array:
-    """The correlation of `leaning_of`."""
-    return leaning_of(R, acceleration, *others)[0]
 
 
 def leaning_of(R: Array, acceleration: Complex, *others: Complex) -> Array:

@@ -214,16 +214,12 @@ def _for_tracking(flight: Flight, broken: set[str], good_nav: list[str], scored:
         return False, say("lacks", what=[f"{listed(wrong)} without a problem"])
     if kinds == {"pixel"} and not good_nav:
         return False, say("no-poses-for-pixels")
-    if (most := _most_scans(flight)) < FEWEST_SCANS:
-        return False, say("few-scans", most=most, fewest=FEWEST_SCANS)
-    return True, say("tracking" if scored else "tracking-without-truth")
-
-
-def _most_scans(flight: Flight) -> int:
-    """In how many images or scans the target is that is seen most; detections without a name are of one."""
+    # Detections without a name are of one.
     seen = flight.table("detections")
     names = [seen["target_id"].fillna("")] if "target_id" in seen else []
-    return int(seen.groupby([seen["source"], *names])["frame_id"].nunique().max())
+    if (most := int(seen.groupby([seen["source"], *names])["frame_id"].nunique().max())) < FEWEST_SCANS:
+        return False, say("few-scans", most=most, fewest=FEWEST_SCANS)
+    return True, say("tracking" if scored else "tracking-without-truth")
 
 
 def _for_navigation(flight: Flight, broken: set[str]) -> tuple[bool, str]:
@@ -249,15 +245,9 @@ def of_known_targets(flight: Flight) -> bool:
     if flight.detections is None or flight.truth is None:
         return False
     if flight.manifest.scoring.rule == "nearest":
-        return not others_about(flight)
+        return not flight.manifest.targets.others
     pixels = flight.detections[flight.detections["kind"] == "pixel"]
     return "target_id" in pixels and bool(pixels["target_id"].isin(flight.truth["target_id"]).any())
-
-
-def others_about(flight: Flight) -> bool:
-    """Whether it is stated that targets are about whose places nobody knows."""
-    many = flight.manifest.targets.many
-    return many is not None and many.others
 
 
 def _kinds(flight: Flight) -> set[str]:
@@ -664,10 +654,10 @@ def missing(flight: Flight) -> Iterator[Finding]:
         labelled = "target_id" in detections and (detections["target_id"] != "").any()
         several = flight.table("truth")["target_id"].nunique() > 1
         if not labelled and ("pixel" in _kinds(flight) or several):
-            others = others_about(flight)
+            others = manifest.targets.others
             level: Level = "note" if others else "warning"
             yield Finding(level, "detections", "target_id", "none-names-a-target", {"others": others})
-    elif others_about(flight):
+    elif manifest.targets.others:
         yield Finding("warning", "flight.toml", "scoring.rule", "nearest-among-others")
 
 

@@ -187,6 +187,13 @@ def attitudes_near(nav: pd.DataFrame, times: Array) -> tuple[Indices, Array]:
     return rows, Rotation.from_quat(q[rows], scalar_first=True).as_matrix()
 
 
+def trimmed_size(values: Array, counted: float) -> float:
+    """Root mean square length of vectors (N, K) that are known, but for the largest; infinite of none."""
+    length = np.sort(np.linalg.norm(values[np.isfinite(values).all(axis=1)], axis=1))
+    kept = length[: max(1, int(counted * len(length)))]
+    return float(np.sqrt(np.mean(kept**2))) if len(length) else np.inf
+
+
 def increasing_rows(table: pd.DataFrame, names: Sequence[str], enough: int) -> Array | None:
     """Finite rows of times and columns (N, 1 + K); None of too few, or where the times do not increase."""
     values = finite_rows(table, ("time_s", *names))

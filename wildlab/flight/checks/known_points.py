@@ -19,7 +19,6 @@ from wildlab.flight.checks.findings import (
     ALIKE,
     FAR_BETTER,
     MOST_NAMED,
-    POSE,
     Change,
     Finding,
     Misfit,
@@ -43,7 +42,14 @@ from wildlab.flight.checks.findings import (
     thin,
     undo_in,
 )
-from wildlab.flight.clocks import frame_times, gimbal_angles, poses_at, truth_at, truth_deviations
+from wildlab.flight.clocks import (
+    frame_times,
+    gimbal_angles,
+    pose_finder,
+    poses_at,
+    truth_at,
+    truth_deviations,
+)
 from wildlab.flight.schema import POSITION
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera, normalise
@@ -161,16 +167,22 @@ def sightings(flight: Flight, source: str) -> Sightings | None:
     chosen = chosen[thin(len(chosen), MOST)]
     frame, detections = frame[chosen], detections.iloc[chosen]
     nav = flight.nav[source]
-    brief = nav[[name for name in nav if name in (*POSE, "frame_id")]]  # covariances take long
     ids = detections["frame_id"]
     labels = detections["target_id"].to_numpy(object) if named else None
+    if labels is not None:
+        truth = truth[truth["target_id"].isin(labels)]
+    late = manifest.clocks.truth_offset_s
     try:
-        times = frame_times(flight)[frame]
+        times, find = frame_times(flight)[frame], pose_finder(nav, ids)
 
         def looked(shift: float) -> SightingGeometry:
-            p, R, _ = poses_at(brief, times + shift, ids)
-            pan, tilt = gimbal_angles(flight, times + shift, frame)
-            return SightingGeometry(p, R, _points(flight, times + shift, labels), pan, tilt)
+            at = times + shift
+            names, points = truth_at(truth, at, late)
+            if labels is not None:
+                points = points[pd.Index(names).get_indexer(pd.Index(labels)), np.arange(len(at))][None]
+            pan, tilt = gimbal_angles(flight, at, frame)
+            p, R = find(at)
+            return SightingGeometry(p, R, points, pan, tilt)
 
         at = looked(0.0)
         _, _, P = poses_at(nav, times, ids)
@@ -197,17 +209,6 @@ def sightings(flight: Flight, source: str) -> Sightings | None:
     known = np.isfinite(at.p_nb).all(axis=1) & np.isfinite(at.R_nb).all(axis=(1, 2))
     known &= np.isfinite(at.points).all(axis=2).any(axis=0) & np.isfinite(at.pan + at.tilt)
     return found.take(known) if known.sum() >= ENOUGH else None
-
-
-def _points(flight: Flight, times: Array, labels: NDArray[np.object_] | None) -> Array:
-    """(M, N, 3) where the targets are; with labels (1, N, 3)."""
-    truth = flight.table("truth")
-    if labels is not None:
-        truth = truth[truth["target_id"].isin(labels)]
-    names, there = truth_at(truth, times, offset_s=flight.manifest.clocks.truth_offset_s)
-    if labels is None:
-        return there
-    return there[pd.Index(names).get_indexer(pd.Index(labels)), np.arange(len(times))][None]
 
 
 def _expected(flight: Flight, P: Array | None, labels: NDArray[np.object_] | None, n: int) -> Array:
@@ -399,8 +400,7 @@ def known_points(flight: Flight) -> Iterator[Finding]:
 def judge(flight: Flight, given: Sightings) -> Iterator[Finding]:
     """The findings about one nav source."""
     if not given.named:
-        many = flight.manifest.targets.many
-        if many is not None and many.others:
+        if flight.manifest.targets.others:
             return  # most of what is detected may be of those whose places nobody knows
         yield from nameless(flight, given)
         if flight.manifest.scoring.rule == "nearest":

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -42,7 +43,7 @@ from wildlab.flight.checks.findings import (
     thin,
     undo_in,
 )
-from wildlab.flight.checks.inertial import fixes, increasing_rows, intervals
+from wildlab.flight.checks.inertial import fixes, increasing_rows, intervals, trimmed_size
 from wildlab.flight.checks.known_points import LONGEST_LEVER, best_of
 from wildlab.flight.clocks import poses_at
 from wildlab.flight.schema import POSITION, VELOCITY
@@ -54,7 +55,7 @@ LEVEL, VERTICAL, SHARE = 0.4, 0.5, 0.05
 #: Intervals: at least so long (s), at most so many, at least so many that moved so fast (m/s).
 STEP_S, LONGEST_S, MOST, ENOUGH, MOVING = 1.0, 5.0, 400, 20, 1.0
 #: The largest twentieth of what is left does not count: steps of a receiver.
-COUNTED = 0.95
+_size = partial(trimmed_size, counted=0.95)
 
 
 @dataclass(frozen=True)
@@ -97,11 +98,6 @@ def _motion_misfit(m: Moved) -> Misfit:
     return crosswise(len(left), 10, lambda _, judged: (_size(left[judged]),) * 2)
 
 
-def _size(values: Array) -> float:
-    length = np.sort(np.linalg.norm(values, axis=1))
-    return float(np.sqrt(np.mean(length[: max(1, int(COUNTED * len(length)))] ** 2)))
-
-
 def motion(flight: Flight) -> Iterator[Finding]:
     """Displacement against velocity, of every table with positions and velocities."""
     tables = {f"nav/{name}": nav for name, nav in flight.nav.items() if not name.startswith("truth")}
@@ -137,7 +133,8 @@ def motion_mistakes(table: str, origin: Origin) -> Iterator[Mistake[Moved]]:
     """Mistakes about velocities, and about positions."""
     part = part_of(table)
     velocities = [(row, change_by(row)) for row in rows_of("velocity")]
-    velocities.append((one_row("course-in-radians"), _course_from_radians))
+    read = one_row("course-in-radians"), lambda v: _course(v, np.degrees(np.arctan2(v[:, 1], v[:, 0])))
+    velocities.append(read)
     for row, change in velocities:
         yield mistake(row, undo_in(change, "velocity"), change_columns(table, VELOCITY, change), part=part)
     yield mistake(one_row("course-in-degrees"), _nearest_course, fitted=True, part=part)
@@ -147,10 +144,6 @@ def motion_mistakes(table: str, origin: Origin) -> Iterator[Mistake[Moved]]:
 def _course(v: Array, course: Array) -> Array:
     speed = np.hypot(v[:, 0], v[:, 1])
     return np.column_stack([speed * np.cos(course), speed * np.sin(course), v[:, 2]])
-
-
-def _course_from_radians(v: Array) -> Array:
-    return _course(v, np.degrees(np.arctan2(v[:, 1], v[:, 0])))
 
 
 def _nearest_course(m: Moved) -> Moved:

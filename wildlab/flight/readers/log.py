@@ -140,7 +140,7 @@ class Stream:
         return replace(self, columns=self.columns | marks)
 
     def take(self, rows: NDArray[Any]) -> Stream:
-        """The rows that a mask or an index picks, of what was judged."""
+        """The rows that a mask or an index picks, of what was judged or has no marks of its own."""
         columns = {name: one[rows] for name, one in self.columns.items()}
         return Stream(columns, self.rows[rows], self.counted_in)
 

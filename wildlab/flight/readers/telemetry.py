@@ -693,7 +693,8 @@ def _ulog_poses(log: Px4Log, notes: list[str]) -> Stream | None:
         return None
     at = taken_s(attitude)
     if place.has("lat") or place.has("latitude_deg"):
-        columns = _at(local, _local_motion(local), at) | _at(place, _from_global(place), at)
+        there = _position(place) | place.columns(named(VELOCITY, ("vel_n", "vel_e", "vel_d")) | SPREADS)
+        columns = _at(local, _local_motion(local), at) | _at(place, there, at)
     else:
         columns = dict.fromkeys(("latitude_deg", "longitude_deg"), np.full(len(at), np.nan))
         notes.append(f"{len(attitude)} attitudes stand without any position on Earth")
@@ -712,14 +713,6 @@ def _at(found: Messages, values: dict[str, Array], times_s: Array) -> dict[str, 
         name: one for name, one in values.items() if name.endswith("tude_deg") or not np.isnan(one).all()
     }
     return at_times(taken_s(found), known, times_s, found.name)
-
-
-def _from_global(place: Messages) -> dict[str, Array]:
-    return {
-        **_position(place),
-        **place.columns(named(VELOCITY, ("vel_n", "vel_e", "vel_d"))),
-        **place.columns(SPREADS),
-    }
 
 
 def _position(place: Messages) -> dict[str, Array]:

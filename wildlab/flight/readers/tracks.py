@@ -487,7 +487,7 @@ def gpx_decode(path: Path, data: bytes, zone: str | None) -> RawLog:
     notes = ["no point carries a time that can be true"]
     return _in_order_of_time(
         RawLog(
-            {"gnss": Stream(columns, None, "point")},
+            {"gnss": Stream(columns, 1 + np.arange(len(columns["time_s"])), "point")},
             clock=UTC_OF_LOG if timed else "",
             lost=told((broken, "point", f"of {len(pieces)} could not be read")),
             notes=[] if timed else notes,
@@ -501,14 +501,8 @@ def _in_order_of_time(found: RawLog) -> RawLog:
     time = part.columns["time_s"]
     if not found.clock or not (np.diff(time) < 0).any():
         return found
-    order = np.argsort(time, kind="stable")
-    rows = (1 + np.arange(len(time)) if part.rows is None else np.asarray(part.rows))[order]
-    columns, reasons = (
-        {name: one[order] for name, one in given.items()} for given in (part.columns, part.unusable)
-    )
-    notes = [*found.notes, "rows were put in order of time"]
-    part = replace(part, columns=columns, rows=rows, unusable=reasons)
-    return replace(found, parts={"gnss": part}, notes=notes)
+    part = part.take(np.argsort(time, kind="stable"))
+    return replace(found, parts={"gnss": part}, notes=[*found.notes, "rows were put in order of time"])
 
 
 def _points(points: list[str]) -> list[Element]:
@@ -612,7 +606,7 @@ def pos_decode(path: Path, data: bytes, zone: str | None) -> RawLog:
     }
     return _in_order_of_time(
         RawLog(
-            {"gnss": Stream(columns, [at for at, _, _ in rows], "line")},
+            {"gnss": Stream(columns, np.array([at for at, _, _ in rows]), "line")},
             clock="GPS time of the rows" if scale == "GPST" else UTC_OF_LOG,
             lost=told((bad, "line", f"of {bad + len(rows)} could not be read")),
         )
