@@ -134,8 +134,10 @@ def test_a_mistake_is_named(make_flight, cause):
     assert any(cause in one for one in found), found
 
 
-@pytest.mark.parametrize(("late", "tilt", "named"), [(0.4, 2.0, False), (0.0, 6.0, True)])
-def test_a_clock_that_is_late_is_not_blamed_on_the_mount(make_flight, late, tilt, named):
+@pytest.mark.parametrize(
+    ("late", "tilt", "cause"), [(0.4, 2.0, "clock of the camera"), (0.0, 6.0, "camera turned")]
+)
+def test_a_clock_that_is_late_is_not_blamed_on_the_mount(make_flight, late, tilt, cause):
     """Of lines flown there and back the turns tell which; 0.4 s are 3.4 deg at 12 m/s and 80 m."""
     rng = np.random.default_rng(5)
     t = np.repeat(np.arange(0.0, 240.0, 2.0), 2)
@@ -150,9 +152,8 @@ def test_a_clock_that_is_late_is_not_blamed_on_the_mount(make_flight, late, tilt
     uv = ground_to_pixel(LENS, points, *camera_pose(Mount("down"), *seen_from))
     image = np.arange(len(t)) // 2
     given = straight_down(LENS, p, R, points, uv, image, [0.006, 0.5, 1.0, 0.006], speed)
-    flight = make_flight()
-    causes = {cause for one in judge(flight, given) for cause in one.causes}
-    assert ("camera turned" in causes) == named and (named or causes <= {"clock of the camera"})
+    (found,) = judge(make_flight(), given)
+    assert found.causes == (cause,)
 
 
 @pytest.mark.parametrize(("focal", "named"), [(700.0, False), (0.7, True)])

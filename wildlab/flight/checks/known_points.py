@@ -382,7 +382,7 @@ LEAP_S = (18.0, -18.0, 19.0, -19.0, 37.0, -37.0)
 TURNED_DEG, LARGEST_TURN_DEG = 5.0, 40.0
 ALLOWED_TURN = np.array([1.0] * 3 + [1e-6] * 3)
 #: Known points tell a clock where it makes them so much likelier (logarithm).
-TOLD = 10.0
+TOLD = 20.0
 #: A lever arm is no longer than this, m.
 LONGEST_LEVER = 5.0
 
@@ -487,11 +487,7 @@ def camera_mistakes(flight: Flight, s: Sightings) -> Iterator[Mistake[Sightings]
     yield from places_in("truth", s.origin, "truth", "points")
     yield from shared_place_mistakes(s)
     yield from height_mistakes(s)
-    timed = flight.manifest.time.kind == "utc"
-    late = best_of(lambda t: sighting_cost(s.shifted(t)), CLOCKS) if timed else 0.0
-    yield from turn_mistakes(s, late)
-    if timed:
-        yield from clock_mistakes(s, late, flight.manifest.clocks.camera_offset_s)
+    yield from turn_and_clock_mistakes(s, flight)
 
 
 def shared_place_mistakes(s: Sightings) -> Iterator[Mistake[Sightings]]:
@@ -653,30 +649,32 @@ def height_mistakes(s: Sightings) -> Iterator[Mistake[Sightings]]:
         )
 
 
-def turn_mistakes(s: Sightings, late: float) -> Iterator[Mistake[Sightings]]:
-    """A camera that is turned against its mount by a constant, as a tilt that was not stated; beside its
-    likeliest clock, where known points tell that it is `late`: on one course both move points alike."""
+def turn_and_clock_mistakes(s: Sightings, flight: Flight) -> Iterator[Mistake[Sightings]]:
+    """A camera that is turned against its mount by a constant, as a tilt that was not stated; and a clock of
+    the camera that is late or early by a constant, by leap seconds or by a zone.
+
+    On one course both move points alike: where these tell the clock, the turn is what is left beside it, and
+    a small one comes off with the clock.
+    """
+    timed, offset_s = flight.timed, flight.manifest.clocks.camera_offset_s
+    late = best_of(lambda t: sighting_cost(s.shifted(t)), CLOCKS) if timed else 0.0
     m, other = missed(s), s.shifted(late)
-    if (sighting_cost(s) - sighting_cost(other)) * m.good.sum() > TOLD:
-        m = missed(other)
+    told = (sighting_cost(s) - sighting_cost(other)) * m.good.sum() > TOLD
+    m = missed(other) if told else m
     e = constant_of(m, m.good, ALLOWED_TURN)[0][:3]
     size = np.degrees(np.linalg.norm(e))
-    if not TURNED_DEG < size < LARGEST_TURN_DEG:
-        return
 
     def turned(x: Sightings) -> Sightings:
         _, R_nc = camera_pose(x.mount, x.p_nb, x.R_nb, x.pan, x.tilt)
         R_cb = np.swapaxes(R_nc, 1, 2) @ x.R_nb
         return replace(x, R_nb=R_nc @ Rotation.from_rotvec(-e).as_matrix() @ R_cb)
 
-    tilt, pan, roll = np.degrees(e)
-    facts = {"size": size, "tilt": tilt, "pan": pan, "roll": roll}
-    yield mistake(one_row("constant-turn"), turned, fitted=True, **facts)
-
-
-def clock_mistakes(s: Sightings, late: float, offset_s: float) -> Iterator[Mistake[Sightings]]:
-    """A constant by which the camera's clock is late or early: the likeliest one, leap seconds and zones;
-    `offset_s` is what the manifest has."""
+    if TURNED_DEG < size < LARGEST_TURN_DEG:
+        tilt, pan, roll = np.degrees(e)
+        facts = {"size": size, "tilt": tilt, "pan": pan, "roll": roll}
+        yield mistake(one_row("constant-turn"), turned, fitted=True, **facts)
+    if not timed:
+        return
 
     def clock(row: Any, by: float, fitted: bool = False, **facts: Any) -> Mistake[Sightings]:
         corrections = (shift_clock("camera_offset_s", by), shift_poses(s.source, -by))
@@ -684,7 +682,9 @@ def clock_mistakes(s: Sightings, late: float, offset_s: float) -> Iterator[Mista
         return mistake(row, lambda x: x.shifted(by), *corrections, fitted=fitted, **facts)
 
     if abs(late) > 0.05:
-        yield clock(one_row("camera-clock"), late, fitted=True)
+        alone = clock(one_row("camera-clock"), late, fitted=True)
+        small = told and size <= TURNED_DEG
+        yield replace(alone, undo=lambda x: turned(x.shifted(late))) if small else alone
     for seconds in LEAP_S:
         yield clock(one_row("leap-seconds"), seconds)
     for hours in HOURS:
