@@ -5,7 +5,7 @@ pictures.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from hashlib import sha256
@@ -45,11 +45,13 @@ from wildlab.analysis.detection_scores import (
 from wildlab.analysis.detectors import (
     METHODS,
     Detected,
+    GivenBoxes,
     for_distance,
     read_thresholds,
     run_detection,
     write_thresholds,
 )
+from wildlab.analysis.tracks.video import camera_motion, track_video
 from wildlab.detection.detections import PART
 from wildlab.detection.warm import to_grey
 from wildlab.errors import WildlabError
@@ -101,6 +103,10 @@ class DetectRequest:
         Which of their classes are meant; empty takes those of the labels' names, or all.
     even
         Whether the fall of brightness towards the corners is taken off first.
+    boxes
+        A file of another detector, whose boxes are taken in place of a method's.
+    tracks
+        Whether it is asked which boxes are the same animal, and how many animals there are.
     """
 
     images: Path
@@ -119,6 +125,8 @@ class DetectRequest:
     also: tuple[str, ...] = ()
     also_classes: tuple[str, ...] = ()
     even: bool = False
+    boxes: Path | None = None
+    tracks: bool = False
 
 
 def detect_images(request: DetectRequest, console: Console) -> dict[str, Any]:
@@ -149,7 +157,10 @@ def detect_images(request: DetectRequest, console: Console) -> dict[str, Any]:
             "a classifier of shapes has to be learnt first",
             "give --fit with labels, or --thresholds of such a run",
         )
-    if (request.classes or request.group) and not (request.labels or request.fit):
+    if request.boxes and (request.fit or request.thresholds):
+        problem = "boxes that are given have no thresholds"
+        raise WildlabError(problem, "leave out --boxes, or --fit and --thresholds", file=request.boxes)
+    if (request.classes or request.group) and not (request.labels or request.fit or request.boxes):
         raise WildlabError(
             "there are no labels whose classes or groups are meant", "give --labels or --fit, or leave it out"
         )
@@ -166,12 +177,18 @@ def detect_images(request: DetectRequest, console: Console) -> dict[str, Any]:
     _refuse_folder(request)
     frames = _open(request)
     labels = _labels(request.labels, request)
+    boxes = (
+        None if request.boxes is None else read_labels(request.boxes, classes=request.classes, truth=labels)
+    )
     to_fit = _labels(request.fit, request)
     others = (
         [] if labels is None else read_others(request.also, labels, request.classes, request.also_classes)
     )
-    thresholds = METHODS[request.method].thresholds()
-    if request.distance_m is not None and request.focal_px is not None:
+    thresholds: Any = METHODS[request.method].thresholds()
+    if boxes is not None:
+        request = replace(request, method="boxes")
+        thresholds = GivenBoxes(boxes.path.name, sha256(repr(boxes.boxes).encode()).hexdigest())
+    elif request.distance_m is not None and request.focal_px is not None:
         if request.fit or request.thresholds:
             raise WildlabError(
                 "lengths come from a distance and from a fit", "leave --distance or the other out"
@@ -199,14 +216,21 @@ def detect_images(request: DetectRequest, console: Console) -> dict[str, Any]:
     write_thresholds(request.out / "thresholds.json", request.method, thresholds)
     with _progress(console, "detecting", frames.count) as tell:
         detected = run_detection(
-            frames, request.out, request.method, thresholds, lambda done: tell(done, None)
+            frames, request.out, request.method, thresholds, lambda done: tell(done, None), boxes
         )
+    if boxes is not None and not any(boxes.name_of(one) for one in detected.frames["frame_id"]):
+        raise boxes.of_other_frames(detected.frames["frame_id"])
+    tracks = None
+    (request.out / "tracks.csv").unlink(missing_ok=True)
+    if request.tracks and (detected.frames["problem"].fillna("") == "").any():
+        with _progress(console, "tracking", frames.count) as tell:
+            tracks, tracked = _tracks(request, frames, detected, lambda done: tell(done, None))
     judged = judge_detections(detected.detections, detected.frames, labels) if labels is not None else None
     things = detected.detections.assign(verdict="detected") if judged is None else judged.things
     names = [str(one) for one in detected.frames["frame_id"]]
     with _progress(console, "drawing", None) as tell:
         pictures = write_pictures(
-            frames, names, things, request.out, request.overlays, lambda done: tell(done, None)
+            frames, names, things, request.out, request.overlays, lambda done: tell(done, None), tracks
         )
     result = _result(request, thresholds, detected, judged, fitted, part, pictures, labels)
     usable = result["frames"]["usable"]
@@ -216,6 +240,9 @@ def detect_images(request: DetectRequest, console: Console) -> dict[str, Any]:
         *too_few_or_many(request.method, request.polarity, len(detected.detections), usable, chosen=chosen),
     ]
     result["facts"] = [*result["notes"], *result["facts"]]
+    if tracks is not None:
+        result["tracks"] = tracked
+        result["facts"] += _facts_of_tracks(request, tracked)
     if others and labels is not None:
         ours = f"wildlab {request.method}"
         compared = compare_detectors(ours, detected.detections, others, detected.frames, labels)
@@ -224,6 +251,40 @@ def detect_images(request: DetectRequest, console: Console) -> dict[str, Any]:
         write_csv(request.out / "compared.csv", curve_table(compared))
     write_json(request.out / "result.json", result)
     return result
+
+
+def _tracks(
+    request: DetectRequest, frames: Frames, detected: Detected, tell: Callable[[int], None]
+) -> tuple[pd.DataFrame, dict[str, Any]]:
+    """Write ``tracks.csv``; its table, and what is told of it."""
+    found = detected.detections
+    boxes = {str(name): own[_BOX].to_numpy(float) for name, own in found.groupby("frame_id", sort=False)}
+
+    def told() -> Iterator[Frame]:
+        for done, frame in enumerate(frames, start=1):
+            tell(done)
+            yield frame
+
+    to_first, unmoved = camera_motion(told(), boxes)
+    if request.distance_m is not None and request.focal_px is not None:
+        metres_per_px = request.distance_m / request.focal_px
+    else:
+        longest = found[["width_px", "height_px"]].max(axis=1)
+        metres_per_px = request.animal_m / float(longest.median()) if len(found) else 1.0
+    table, animals = track_video(found, detected.frames, to_first, metres_per_px)
+    write_csv(request.out / "tracks.csv", table)
+    count = {"animals": animals.mean, "low": animals.low, "high": animals.high}
+    return table, {"tracks": int(table["track"].nunique()), **count, "unmoved": unmoved}
+
+
+def _facts_of_tracks(request: DetectRequest, tracked: Mapping[str, Any]) -> list[Fact]:
+    animals = {"animals": f"{tracked['animals']:.1f}", "low": tracked["low"], "high": tracked["high"]}
+    found = [fact("detect-tracks", tracks=tracked["tracks"], **animals)]
+    if tracked["unmoved"]:
+        found.append(fact("detect-unmoved", n=tracked["unmoved"]))
+    if (request.images / "flight.toml").is_file() and load_flight(request.images).nav:
+        found.append(fact("detect-poses"))
+    return found
 
 
 def _refuse_folder(request: DetectRequest) -> None:
@@ -488,8 +549,8 @@ MOST_FOUND = 40
 _BOX = ["left_px", "top_px", "width_px", "height_px"]
 
 
-def overlay_picture(frame: Frame, things: pd.DataFrame) -> Picture:
-    """A frame with what was found in it.
+def overlay_picture(frame: Frame, things: pd.DataFrame, tracks: pd.DataFrame | None = None) -> Picture:
+    """A frame with what was found in it, and the numbers of tracks.
 
     Parameters
     ----------
@@ -497,6 +558,8 @@ def overlay_picture(frame: Frame, things: pd.DataFrame) -> Picture:
         One that can be used.
     things
         Rows with ``left_px``, ``top_px``, ``width_px``, ``height_px`` and ``verdict``, a word of `COLOURS`.
+    tracks
+        Rows with a box and ``track``.
 
     Returns
     -------
@@ -510,6 +573,11 @@ def overlay_picture(frame: Frame, things: pd.DataFrame) -> Picture:
     for box, verdict in zip(boxes, things["verdict"], strict=True):
         near, far = np.rint(box[:2] - 5).astype(int), np.rint(box[:2] + box[2:] + 5).astype(int)
         cv2.rectangle(picture, near.tolist(), far.tolist(), COLOURS[str(verdict)], 1, cv2.LINE_AA)
+    for name, left, top in [] if tracks is None else tracks[["track", *_BOX[:2]]].to_numpy():
+        place = (int(left) - 5, int(top) - 8)
+        cv2.putText(
+            picture, f"{name:.0f}", place, cv2.FONT_HERSHEY_SIMPLEX, 0.4, COLOURS["missed"], 1, cv2.LINE_AA
+        )
     return picture
 
 
@@ -575,6 +643,7 @@ def write_pictures(
     into: Path,
     most: int,
     tell: Callable[[int], None] | None = None,
+    tracks: pd.DataFrame | None = None,
 ) -> dict[str, int]:
     """Overlay pictures of some frames, evenly over the flight, and sheets of what was missed and invented.
 
@@ -594,6 +663,8 @@ def write_pictures(
         How many overlays.
     tell
         Called with the number of frames that were drawn.
+    tracks
+        As of `wildlab.analysis.tracks.video.track_video`: their numbers are drawn.
 
     Returns
     -------
@@ -621,7 +692,8 @@ def write_pictures(
             continue
         own = by_frame.get(frame.name, things.iloc[:0])
         if frame.name in drawn:
-            write_atomic(folder / files[frame.name], _jpeg(overlay_picture(frame, own)))
+            numbers = None if tracks is None else tracks[tracks["frame_id"] == frame.name]
+            write_atomic(folder / files[frame.name], _jpeg(overlay_picture(frame, own, numbers)))
             overlays += 1
         for word, rows in chosen.items():
             some = own.loc[own.index.intersection(rows)]

@@ -19,13 +19,14 @@ from pydantic import TypeAdapter, ValidationError
 
 from wildlab.detection.colour import Colour, find_coloured
 from wildlab.detection.contrast import Contrast, Shape, find_by_contrast, find_by_shape
-from wildlab.detection.detections import Detections, no_detections
+from wildlab.detection.detections import Detections, detections_of_boxes, no_detections
 from wildlab.detection.floating import FloatingThresholds, detect_floating
 from wildlab.detection.warm import Warm, block_from_distance, find_warm, gate_from_distance, to_grey
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic, write_csv, write_json
 from wildlab.flight.files import read_regular
 from wildlab.flight.readers.frames import Frame, Frames
+from wildlab.flight.readers.labels import Labels
 
 #: Frames between two savings: what is lost at most where a run is broken off.
 PART = 25
@@ -76,6 +77,23 @@ def detect_frame(frame: Frame, method: str, thresholds: Any) -> Detections:
         thresholds = how.black_hot(thresholds)
     as_it_is = how.colours or frame.image.ndim == 2
     return how.find(frame.image if as_it_is else to_grey(frame.image), frame.valid, thresholds)
+
+
+@dataclass(frozen=True)
+class GivenBoxes:
+    """In place of thresholds: the file whose boxes are taken, and what is in it."""
+
+    file: str
+    sha256: str
+
+
+def given_boxes(frame: Frame, boxes: Labels) -> Detections:
+    """What another detector found in one frame."""
+    name = boxes.name_of(frame.name)
+    if not frame.usable or name is None:
+        return no_detections()
+    found, _ = boxes.boxes_of(frame.name, name, *frame.image.shape[1::-1])
+    return detections_of_boxes(found, boxes.scores[name])
 
 
 def detections_table(frame: Frame, found: Detections, source: str) -> pd.DataFrame:
@@ -163,6 +181,7 @@ def run_detection(
     method: str,
     thresholds: Any,
     tell: Callable[[int], None] | None = None,
+    boxes: Labels | None = None,
 ) -> Detected:
     """Detections of all frames; what was finished before is not computed again.
 
@@ -177,6 +196,8 @@ def run_detection(
         As for `detect_frame`.
     tell
         Called with the number of frames that are done.
+    boxes
+        What another detector found, in place of a method; ``thresholds`` say whose these are.
 
     Returns
     -------
@@ -197,8 +218,9 @@ def run_detection(
         tell(kept)
     batch: list[tuple[pd.DataFrame, dict[str, Any]]] = []
     for frame in _from(frames, kept):
-        found = detect_frame(frame, method, thresholds)
-        batch.append((detections_table(frame, found, f"wildlab {method}"), frame_row(frame, found)))
+        found = detect_frame(frame, method, thresholds) if boxes is None else given_boxes(frame, boxes)
+        source = f"wildlab {method}" if boxes is None else boxes.path.name
+        batch.append((detections_table(frame, found, source), frame_row(frame, found)))
         if len(batch) == PART:
             _save_part(parts, digest, len(tables), batch, tables, rows)
             batch = []

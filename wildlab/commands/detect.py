@@ -39,6 +39,8 @@ ABOVE_ZERO = click.FloatRange(0, min_open=True)
 @click.option("--focal", "focal_px", type=ABOVE_ZERO, help="Focal length, px; with --distance.")
 @click.option("--animal", "animal_m", type=ABOVE_ZERO, default=1.5, show_default=True, help="Length, m.")
 @click.option("--even", is_flag=True, help="Correct corners that are darker.")
+@click.option("--boxes", type=ANY, help="Boxes of another detector, in place of a method's.")
+@click.option("--tracks", is_flag=True, help="Which boxes are the same animal, and how many are there?")
 @shared.as_json
 def detect(as_json: bool, **asked: Any) -> None:
     """Find animals, people or vessels in IMAGES.
@@ -50,12 +52,16 @@ def detect(as_json: bool, **asked: Any) -> None:
 
     Leaves report.html, detections.csv and .parquet, frames.csv, thresholds.json, pictures in overlays, and
     with labels what was missed and invented. With --also, compared.csv has precision and recall of each
-    detector along its score. A run that was broken off goes on where it stopped.
+    detector along its score. With --tracks, tracks.csv says which boxes are the same animal, and the page how
+    many animals there are; nothing need be known of the camera. A run that was broken off goes on where it
+    stopped.
 
     \b
     Examples:
       wildlab detect flights/tuesday/images --out found
       wildlab detect clip.mp4 --method warm --out found
+      wildlab detect clip.mp4 --tracks --out found
+      wildlab detect clip.mp4 --boxes megadetector.json --tracks --out found
       wildlab detect images --distance 60 --focal 765 --animal 1.5 --out found
       wildlab detect images --fit labels.csv --class Person --out found
       wildlab detect images --labels coco.json --also megadetector=batch.json --also yolo=labels --out found
@@ -110,5 +116,6 @@ def write_page(out: Path, name: str, result: dict[str, Any]) -> None:
     overlays = [(one.stem, one.read_bytes()) for one in drawn[::step]]
     thresholds = json.loads((out / "thresholds.json").read_text(encoding="utf-8"))["thresholds"]
     curves = read_csv(out / "compared.csv", ("detector",)) if "compared" in result else None
-    page = detections_page(name, result, frames, sheets, overlays, thresholds, curves)
+    tracks = read_csv(out / "tracks.csv", ("frame_id",)) if "tracks" in result else None
+    page = detections_page(name, result, frames, sheets, overlays, thresholds, curves, tracks)
     write_atomic(out / "report.html", page)

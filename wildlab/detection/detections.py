@@ -108,6 +108,27 @@ def no_detections() -> Detections:
     return Detections(*(np.zeros((0, *shape)) for shape in shapes))
 
 
+def detections_of_boxes(boxes: Array, scores: Array) -> Detections:
+    """Boxes (N, 4), left, top, width and height, of a detector that tells no more but its scores (N,).
+
+    Their middles are off as in `describe`, by `PART` of what is longer.
+    """
+    sides, unknown = boxes[:, 2:], np.full(len(boxes), np.nan)
+    axes = -np.sort(-sides)
+    spread = FLOOR**2 + (PART * axes[:, 0]) ** 2
+    return Detections(
+        boxes[:, :2] + sides / 2,
+        spread[:, None, None] * np.eye(2),
+        sides.prod(axis=1),
+        unknown,
+        boxes,
+        axes,
+        np.where(sides[:, 0] < sides[:, 1], np.pi / 2, 0.0),
+        np.tile(unknown[:, None], 7),
+        scores,
+    )
+
+
 def describe(
     labels: NDArray[np.int32],
     image: NDArray[Any],

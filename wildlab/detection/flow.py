@@ -279,27 +279,53 @@ def image_motion(first: Grey, second: Grey, camera: Camera, valid: Mask | None =
         Tangents along the columns and the rows, and the turn from the columns' to the rows' axis (rad); NaN
         where too few features agree.
     """
-    lost = np.full(3, np.nan)
-    mask = None if valid is None else np.asarray(valid, np.uint8)
-    points = cv2.goodFeaturesToTrack(first, MOST_CORNERS, 0.01, 8, mask=mask)
-    if points is None or len(points) < FEWEST_CORNERS:
-        return lost
-    there, found = _follow(first, second, np.asarray(points, np.float32))
-    back, found_back = _follow(second, first, there)
-    here, after = np.asarray(points, np.float32)[:, 0], there[:, 0]
-    good = found & found_back & (np.linalg.norm(back[:, 0] - here, axis=1) < BACK_PX)
-    if good.sum() < FEWEST_CORNERS:
-        return lost
-    a, b = normalise(camera, here[good].astype(float)), normalise(camera, after[good].astype(float))
+    here, there = followed_corners(first, second, valid)
+    a, b = normalise(camera, here), normalise(camera, there)
     known = np.isfinite(a).all(axis=1) & np.isfinite(b).all(axis=1)
-    if known.sum() < FEWEST_CORNERS:
+    moved, rows = common_homography(a[known], b[known], AGREEMENT_PX / camera.fx)
+    return plane_motion(a[known][rows], b[known][rows]) if np.isfinite(moved).all() else np.full(3, np.nan)
+
+
+def followed_corners(first: Grey, second: Grey, valid: Mask | None = None) -> tuple[Array, Array]:
+    """Corners of one image, (N, 2) px, and where they are in the other: those that are also followed back.
+
+    Parameters
+    ----------
+    first, second, valid
+        As of `image_motion`.
+    """
+    mask = None if valid is None else np.asarray(valid, np.uint8)
+    found = cv2.goodFeaturesToTrack(first, MOST_CORNERS, 0.01, 8, mask=mask)
+    if found is None or not len(found):
+        return np.zeros((0, 2)), np.zeros((0, 2))
+    points = np.asarray(found, np.float32)
+    there, followed = _follow(first, second, points)
+    back, followed_back = _follow(second, first, there)
+    good = followed & followed_back & (np.linalg.norm(back - points, axis=2)[:, 0] < BACK_PX)
+    return points[good, 0].astype(float), there[good, 0].astype(float)
+
+
+def common_homography(first: Array, second: Array, agreement: float) -> tuple[Array, Mask]:
+    """The homography (3, 3) that takes most of some points (N, 2) to others, and which it takes there.
+
+    Parameters
+    ----------
+    first, second
+        Of the same things in two images.
+    agreement
+        How far a point may be from where it takes it, in the unit of the points.
+
+    Returns
+    -------
+    NaN where too few agree.
+    """
+    lost = np.full((3, 3), np.nan), np.zeros(len(first), bool)
+    if len(first) < FEWEST_CORNERS:
         return lost
-    a, b = a[known], b[known]
-    _, kept = cv2.findHomography(a, b, cv2.RANSAC, AGREEMENT_PX / camera.fx, maxIters=500)
-    rows = np.zeros(len(a), bool) if kept is None else np.asarray(kept).ravel() > 0
-    if rows.sum() < max(FEWEST_CORNERS, AGREE * len(rows)):
-        return lost
-    return plane_motion(a[rows], b[rows])
+    found, kept = cv2.findHomography(first, second, cv2.RANSAC, agreement, maxIters=500)
+    rows = np.zeros(len(first), bool) if kept is None else np.asarray(kept).ravel() > 0
+    enough = rows.sum() >= max(FEWEST_CORNERS, AGREE * len(rows))
+    return (np.asarray(found, float), rows) if enough else lost
 
 
 def plane_motion(first: Array, second: Array) -> Array:

@@ -51,7 +51,9 @@ def answer(result: Mapping[str, Any]) -> list[Message]:
     """What was found, and whether the ellipses hold; two sentences at most."""
     if not result["frames"]["usable"]:
         return [Message("no-image")]
-    rows = rates_shown(result)
+    rows, tracks = rates_shown(result), result.get("tracks")
+    if not rows and tracks:
+        return [Message("animals", tracks | {"animals": f"{tracks['animals']:.1f}"})]
     if not rows:
         return [Message("not-judged", {"detections": result["detections"]})]
     where, best = next(iter(rows.items()))
@@ -134,6 +136,16 @@ def compared_table(compared: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
     )
 
 
+def tracks_table(tracks: pd.DataFrame) -> pd.DataFrame:
+    """A row for each track: from which frame to which, in how many it was detected, and how sure it is."""
+    rows = tracks.assign(seen=tracks["detection_id"].fillna("") != "").groupby("track")
+    found = rows.agg(
+        first=("frame_id", "first"), last=("frame_id", "last"), frames=("seen", "size"), seen=("seen", "sum"),
+        existence=("existence", "max"), sd=("sd_px", "median"),
+    )  # fmt: skip
+    return found.reset_index().astype({"track": str})
+
+
 def precision_over_recall(names: Sequence[str], curves: pd.DataFrame) -> Figure:
     """Precision beside recall along the score, a line for each detector with a score; dots: all its boxes."""
     fig, ax = new_figure(5.6, 3.8)
@@ -169,6 +181,7 @@ def detections_page(
     overlays: Sequence[tuple[str, bytes]],
     thresholds: Mapping[str, Any],
     curves: pd.DataFrame | None = None,
+    tracks: pd.DataFrame | None = None,
 ) -> str:
     """The whole page, without anything that has to be fetched.
 
@@ -189,6 +202,8 @@ def detections_page(
     curves
         Of detectors that are compared, as of `wildlab.analysis.detection_scores.curve_table`; None where
         there is only ours.
+    tracks
+        As of `wildlab.analysis.tracks.video.track_video`; None where they are not asked for.
 
     Returns
     -------
@@ -213,6 +228,8 @@ def detections_page(
         report.section(names["advice"], part=ADVICE)
         report.points(said)
     wording.table("rates", rates_table(result))
+    if tracks is not None and len(tracks):
+        wording.table("tracks", tracks_table(tracks))
     compared = result.get("compared", ())
     if curves is not None and len(compared) > 1:
         _show_compared(wording, compared, curves)
@@ -229,6 +246,9 @@ def detections_page(
 def _tiles(result: Mapping[str, Any], names: Mapping[str, str]) -> list[tuple[str, str]]:
     of = result["frames"]
     tiles = [(f"{of['usable']} of {of['all']}", names["tile-images"])]
+    if tracks := result.get("tracks"):
+        span = f" ({tracks['low']} to {tracks['high']}, 90 %)"
+        tiles.append((f"{tracks['animals']:.1f}", names["tile-animals"] + span))
     rates: Mapping[str, Any] = next(iter(rates_shown(result).values()), {})
     for key in ("recall", "precision") if rates else ():
         one = rates[key]
