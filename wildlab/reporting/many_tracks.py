@@ -287,7 +287,7 @@ def show_many(report: Report, followed: ManyTracks, lives: Identities | None) ->
     report.summary(wording.messages(answer(followed, lives)), level=level, verdict=verdict)
     if followed.notes:
         report.points(followed.notes)
-    figure, name, alt, caption = charts.tracks_shown(followed)
+    figure, name, alt, caption = charts.tracks_shown(followed, lives)
     report.figure(figure, name=name, alt=alt, caption=caption, main=True)
     if lives is not None and any(life.visible for life in lives.targets.values()):
         report.section(names["over-time"])

@@ -631,8 +631,9 @@ def colours_of(followed: ManyTracks) -> dict[object, str]:
     return {name: own.get(name, INK) for name in names}
 
 
-def tracks_shown(followed: ManyTracks) -> Shown:
+def tracks_shown(followed: ManyTracks, lives: Identities | None = None) -> Shown:
     """Where every track went, in local metres, north up, beside the true ways."""
+    false = set() if lives is None else {name for name, life in lives.tracks.items() if life.false}
     fig, ax = new_figure(5.6, 5.4)
     for way in followed.truth.values():
         draw_way(ax, way, name="truth", zorder=3, **TRUTH)
@@ -645,7 +646,8 @@ def tracks_shown(followed: ManyTracks) -> Shown:
         tint, named = tints[identity], tints[identity] != INK
         name = f"track {identity}" if named else "other tracks"
         draw_way(ax, parted(way, times)[:, 1:], tint, name, width=1.8 if named else 1.0)
-        ax.plot(way[:1, 2], way[:1, 1], "o", color=tint, ms=5)
+        begins = {"marker": "x", "ms": 6} if identity in false else {"marker": "o", "ms": 5 if named else 3}
+        ax.plot(way[:1, 2], way[:1, 1], color=tint, **begins)
     map_axes(ax)
     finish(fig)
     values = {"tracks": len(ways), "targets": len(followed.truth), "most": MOST_NAMED}
