@@ -31,6 +31,7 @@ from wildlab.analysis.detection_fit import (
     with_part,
 )
 from wildlab.analysis.detection_scores import (
+    BOX,
     ELLIPSE,
     DetectorScore,
     compare_detectors,
@@ -258,7 +259,7 @@ def _tracks(
 ) -> tuple[pd.DataFrame, dict[str, Any]]:
     """Write ``tracks.csv``; its table, and what is told of it."""
     found = detected.detections
-    boxes = {str(name): own[_BOX].to_numpy(float) for name, own in found.groupby("frame_id", sort=False)}
+    boxes = {str(name): own[BOX].to_numpy(float) for name, own in found.groupby("frame_id", sort=False)}
 
     def told() -> Iterator[Frame]:
         for done, frame in enumerate(frames, start=1):
@@ -546,7 +547,6 @@ AROUND, TILE, IN_A_ROW = 64, 160, 8
 MOST_TILES = 80
 #: Of what was found, fewer: these are looked through, not searched for a mistake.
 MOST_FOUND = 40
-_BOX = ["left_px", "top_px", "width_px", "height_px"]
 
 
 def overlay_picture(frame: Frame, things: pd.DataFrame, tracks: pd.DataFrame | None = None) -> Picture:
@@ -569,11 +569,11 @@ def overlay_picture(frame: Frame, things: pd.DataFrame, tracks: pd.DataFrame | N
     picture = _picture(frame)
     hatched = ~frame.valid & (np.add.outer(*(np.arange(n) for n in frame.valid.shape)) % 8 < 2)
     picture[hatched] = (90, 60, 60)
-    boxes = things[_BOX].to_numpy(float)
+    boxes = things[BOX].to_numpy(float)
     for box, verdict in zip(boxes, things["verdict"], strict=True):
         near, far = np.rint(box[:2] - 5).astype(int), np.rint(box[:2] + box[2:] + 5).astype(int)
         cv2.rectangle(picture, near.tolist(), far.tolist(), COLOURS[str(verdict)], 1, cv2.LINE_AA)
-    for name, left, top in [] if tracks is None else tracks[["track", *_BOX[:2]]].to_numpy():
+    for name, left, top in [] if tracks is None else tracks[["track", *BOX[:2]]].to_numpy():
         place = (int(left) - 5, int(top) - 8)
         cv2.putText(
             picture, f"{name:.0f}", place, cv2.FONT_HERSHEY_SIMPLEX, 0.4, COLOURS["missed"], 1, cv2.LINE_AA
@@ -698,7 +698,7 @@ def write_pictures(
         for word, rows in chosen.items():
             some = own.loc[own.index.intersection(rows)]
             ranks = np.nan_to_num(some["score"].to_numpy(float))
-            for box, rank in zip(some[_BOX].to_numpy(float), ranks, strict=True):
+            for box, rank in zip(some[BOX].to_numpy(float), ranks, strict=True):
                 tiles[word].append((float(rank), cut_tile(frame, box, COLOURS[word]), frame.name))
     counts = {"overlays": overlays}
     for word, cut in tiles.items():

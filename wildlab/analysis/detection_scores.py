@@ -31,8 +31,9 @@ from wildlab.geometry.frames import Indices, Mask
 
 #: Probability of the ellipses that are held against labels.
 ELLIPSE = 0.9
-_COVARIANCE = ["cov_uu_px2", "cov_uv_px2", "cov_uv_px2", "cov_vv_px2"]
-_BOX = ["left_px", "top_px", "width_px", "height_px"]
+#: Columns of a table of detections.
+COVARIANCE = ["cov_uu_px2", "cov_uv_px2", "cov_uv_px2", "cov_vv_px2"]
+BOX = ["left_px", "top_px", "width_px", "height_px"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,13 +173,13 @@ def judge_detections(detections: pd.DataFrame, frames: pd.DataFrame, labels: Lab
     judged = judged_frames(detections, frames, labels)
     for frame, name, (width, height), problem, own, scored in judged:
         unusable += problem
-        true, boxes = scored.labels, own[_BOX].to_numpy(float)
+        true, boxes = scored.labels, own[BOX].to_numpy(float)
         if width and height:
             beyond = (true[:, :2] >= [width, height]) | (true[:, :2] + true[:, 2:] < 0)
             outside += int(beyond.any(axis=1).sum())
         found = match(scored.boxes, true, ignore=scored.ignore)
-        if set(_COVARIANCE) <= set(own.columns) and len(found.pairs):
-            covariance = own[_COVARIANCE].to_numpy(float)[found.pairs[:, 0]].reshape(-1, 2, 2)
+        if set(COVARIANCE) <= set(own.columns) and len(found.pairs):
+            covariance = own[COVARIANCE].to_numpy(float)[found.pairs[:, 0]].reshape(-1, 2, 2)
             middle = true[:, :2] + true[:, 2:] / 2
             off = middle[found.pairs[:, 1]] - own[["u_px", "v_px"]].to_numpy(float)[found.pairs[:, 0]]
             known = np.isfinite(covariance).all(axis=(1, 2))
@@ -190,7 +191,7 @@ def judge_detections(detections: pd.DataFrame, frames: pd.DataFrame, labels: Lab
         rows += [(frame, "missed", *true[row], np.nan) for row in found.missed]
     if not counts:
         raise labels.of_other_frames(frames["frame_id"])
-    things = pd.DataFrame(rows, columns=["frame_id", "verdict", *_BOX, "score"])
+    things = pd.DataFrame(rows, columns=["frame_id", "verdict", *BOX, "score"])
     absent = tuple(sorted(set(labels.boxes) - {one.name for one in judged}))
     return DetectorScore(
         rates(np.array(counts), groups), things, len(counts), len(frames) - len(counts), unusable, absent,

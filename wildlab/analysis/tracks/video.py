@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
+from wildlab.analysis.detection_scores import BOX, COVARIANCE
 from wildlab.analysis.tracks.ground_positions import PlacedScans
 from wildlab.analysis.tracks.many import LEAST_FALSE, model_jointly
 from wildlab.analysis.tracks.noise_model import model_targets
@@ -23,12 +24,10 @@ from wildlab.geometry.covariances import gate_threshold
 from wildlab.geometry.frames import Array, Indices, Mask
 from wildlab.paths import DATA
 from wildlab.tracking.association import association_probabilities, global_nearest, innovation_squared
-from wildlab.tracking.motion import white_acceleration
 from wildlab.tracking.multitarget import Shown, smooth_many
-from wildlab.tracking.multitarget_tracks import Count, count_interval, count_probabilities
+from wildlab.tracking.multitarget_tracks import Count, count_interval, count_probabilities, likelihoods
 from wildlab.tracking.target_model import ManyTargetModel, Scan
 
-BOX = ["left_px", "top_px", "width_px", "height_px"]
 #: Frames a second where they do not say.
 RATE_HZ = 10.0
 #: A frame whose scene moved by more of its width, or has less of the corners that others shared with the same
@@ -148,7 +147,7 @@ def track_video(
             false = max((len(detections) - taken) / len(scans), LEAST_FALSE)
             seen = float(np.clip(taken / max(there, 1), 0.1, 0.99))
             sensor = sensor._replace(clutter=false / area, detection=seen)
-    same, count = _returned(scans, shown, own, targets, area)
+    same, count = _returned(shown, own, targets, area)
     numbers = [np.append(mine, -1)[one] for mine, one in zip(rows, own, strict=True)]
     table = _table(detections, frames, to_first, metres_per_px, shown, numbers)
     return table.assign(track=table["track"].map(same)), count
@@ -163,7 +162,7 @@ def _scans(
         times = np.arange(len(frames)) / RATE_HZ
     size = frames[["width_px", "height_px"]].max().to_numpy(float)
     uv = detections[["u_px", "v_px"]].to_numpy(float)
-    R = detections[["cov_uu_px2", "cov_uv_px2", "cov_uv_px2", "cov_vv_px2"]].to_numpy(float).reshape(-1, 2, 2)
+    R = detections[COVARIANCE].to_numpy(float).reshape(-1, 2, 2)
     scans = []
     for time, mine, H in zip(times, rows, to_first, strict=True):
         at = warped(H, uv[mine])
@@ -192,35 +191,32 @@ def _own_boxes(scan: Scan, shown: Shown) -> Indices:
 
 
 def _returned(
-    scans: list[Scan], shown: list[Shown], own: list[Indices], targets: ManyTargetModel, area: float
+    shown: list[Shown], own: list[Indices], targets: ManyTargetModel, area: float
 ) -> tuple[dict[int, int], Count]:
     """The number that each track gets, and how many animals there are.
 
     A track that begins may be an animal whose track ended before: as probable as its place under the earlier
     track's motion, against newcomers anywhere in view.
     """
-    first, last, exists = dict[int, int](), dict[int, int](), dict[int, float]()
-    for k, (one, boxes) in enumerate(zip(shown, own, strict=True)):
-        for name, existence, box in zip(one.identity.tolist(), one.existence, boxes, strict=True):
-            exists[name] = max(exists.get(name, 0.0), float(existence))
-            if box >= 0:
-                first.setdefault(name, k)
-                last[name] = k
-    names = sorted(first)
+    begins, ends = dict[int, tuple[float, Array, Array]](), dict[int, tuple[float, Array, Array]]()
+    exists = dict[int, float]()
+    for one, boxes in zip(shown, own, strict=True):
+        for row, name in enumerate(one.identity.tolist()):
+            exists[name] = max(exists.get(name, 0.0), float(one.existence[row]))
+            if boxes[row] >= 0:
+                ends[name] = one.time, one.x[row], one.P[row]
+                begins.setdefault(name, ends[name])
+    names = sorted(begins)
+    times, x, P = (np.array([begins[name][part] for name in names]) for part in range(3))
     weights = np.zeros((len(names), len(names)))
-    for i, old in enumerate(names):
-        end = shown[last[old]]
-        row = int(np.flatnonzero(end.identity == old)[0])
-        for j, new in enumerate(names):
-            start = shown[first[new]]
-            if start.time > end.time:
-                F, Q = white_acceleration(start.time - end.time, targets.density)
-                at = int(np.flatnonzero(start.identity == new)[0])
-                S = (F @ end.P[row] @ F.T + Q + start.P[at])[:2, :2]
-                off = start.x[at, :2] - (F @ end.x[row])[:2]
-                near = np.exp(-innovation_squared(off, S) / 2) / (2 * np.pi * np.sqrt(np.linalg.det(S)))
-                lasts = np.exp(-(start.time - end.time) / targets.lifetime_s)
-                weights[i, j] = lasts * near * area
+    for i, name in enumerate(names):
+        time, state, spread = ends[name]
+        later = np.flatnonzero(times > time)
+        gap = (times[later] - time)[:, None, None]
+        F = np.concatenate([np.ones_like(gap) * np.eye(2), gap * np.eye(2)], axis=2)
+        S = F @ spread @ np.swapaxes(F, 1, 2) + targets.density**2 * gap**3 / 3 * np.eye(2)
+        near = likelihoods(x[later, :2] - F @ state, S + P[later, :2, :2], np.inf)
+        weights[i, later] = np.exp(-gap[:, 0, 0] / targets.lifetime_s) * near * area
     # How many newcomers are to be expected nobody knows: as many as there are tracks, or one.
     missed = np.ones(len(names))
     likely = [association_probabilities(weights / many, missed)[:, 1:] for many in (max(len(names), 1), 1)]
