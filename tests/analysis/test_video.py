@@ -100,7 +100,7 @@ def test_boxes_of_another_detector_become_tracks(tmp_path):
     given = ("detect", path, "--out", tmp_path / "out", "--boxes", tmp_path / "boxes.csv", "--tracks")
     result = json.loads(succeed(*given, "--json"))
     assert result["detections"] == 12 and result["tracks"]["tracks"] == 2
-    assert (result["tracks"]["low"], result["tracks"]["high"]) == (2, 2)
+    assert (result["tracks"]["low"], result["tracks"]["high"]) == (2, 2) and result["tracks"]["untimed"]
     table = pd.read_csv(tmp_path / "out" / "tracks.csv")
     assert table.groupby("track").size().tolist() == [6, 6]
     assert "(2 to 2" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")

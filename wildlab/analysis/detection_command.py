@@ -245,7 +245,7 @@ def detect_images(request: DetectRequest, console: Console) -> dict[str, Any]:
         result["tracks"] = tracked
         result["facts"] += _facts_of_tracks(request, tracked)
     if others and labels is not None:
-        ours = f"wildlab {request.method}"
+        ours = f"wildlab {request.method}" if boxes is None else printable(boxes.path.name)
         compared = compare_detectors(ours, detected.detections, others, detected.frames, labels)
         result["compared"] = [one.as_plain() for one in compared]
         result["facts"] += [line for one in compared for line in facts_of(one, compared[0])]
@@ -275,7 +275,9 @@ def _tracks(
     table, animals = track_video(found, detected.frames, to_first, metres_per_px)
     write_csv(request.out / "tracks.csv", table)
     count = {"animals": animals.mean, "low": animals.low, "high": animals.high}
-    return table, {"tracks": int(table["track"].nunique()), **count, "unmoved": unmoved}
+    usable = detected.frames["problem"].fillna("") == ""
+    untimed = bool(detected.frames.loc[usable, "time_s"].isna().any())
+    return table, {"tracks": int(table["track"].nunique()), **count, "unmoved": unmoved, "untimed": untimed}
 
 
 def _facts_of_tracks(request: DetectRequest, tracked: Mapping[str, Any]) -> list[Fact]:
@@ -283,6 +285,8 @@ def _facts_of_tracks(request: DetectRequest, tracked: Mapping[str, Any]) -> list
     found = [fact("detect-tracks", tracks=tracked["tracks"], **animals)]
     if tracked["unmoved"]:
         found.append(fact("detect-unmoved", n=tracked["unmoved"]))
+    if tracked["untimed"]:
+        found.append(fact("detect-untimed"))
     if (request.images / "flight.toml").is_file() and load_flight(request.images).nav:
         found.append(fact("detect-poses"))
     return found
