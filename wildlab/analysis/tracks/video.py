@@ -33,6 +33,9 @@ RATE_HZ = 10.0
 #: A frame whose scene moved by more of its width, or has less of the corners that others shared with the same
 #: frame, is followed from the one before it: a homography by few corners is far off where there are none.
 FAR_MOVED, ENOUGH = 0.2, 0.6
+#: What is left of the camera's motion in a place, SD of each axis, px: ground is not level, and boxes change
+#: as what is warm joins and parts.
+LEFT_PX = 1.0
 #: px about a box in which nothing stands still.
 AROUND = 2
 #: Probability that a track's own box is let in.
@@ -162,7 +165,7 @@ def _scans(
         times = np.arange(len(frames)) / RATE_HZ
     size = frames[["width_px", "height_px"]].max().to_numpy(float)
     uv = detections[["u_px", "v_px"]].to_numpy(float)
-    R = detections[COVARIANCE].to_numpy(float).reshape(-1, 2, 2)
+    R = detections[COVARIANCE].to_numpy(float).reshape(-1, 2, 2) + LEFT_PX**2 * np.eye(2)
     scans = []
     for time, mine, H in zip(times, rows, to_first, strict=True):
         at = warped(H, uv[mine])
