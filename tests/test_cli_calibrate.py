@@ -119,7 +119,7 @@ def test_a_flight_imported_with_a_calibration_keeps_it_and_is_judged_with_it(fol
 
     jobs = []
     kept = "wildlab.runner.evaluate.run_all"
-    monkeypatch.setattr(kept, lambda groups, *_, **__: jobs.extend(groups[0]) or [])
+    monkeypatch.setattr(kept, lambda given, *_, **__: jobs.extend(given) or [])
     save_flight(load_flight(folder / "tilted"), tmp_path / "g", calibration=learnt)
     save_flight(load_flight(tmp_path / "g"), tmp_path / "h")
     for name, expected in (("g", True), ("h", True), ("tilted", False)):

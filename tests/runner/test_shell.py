@@ -104,7 +104,7 @@ def test_whoever_is_ended_between_two_cells_leaves_a_whole_notebook(tmp_path, mo
     monkeypatch.setenv("IPYTHONDIR", str(tmp_path / ".ipython"))
     into, seen = tmp_path / "ours.ipynb", []
 
-    def on_cell(index, count):
+    def on_cell(index, count, tags):
         kept = nbformat.read(into, as_version=4)
         seen.append((index, [cell.get("execution_count") for cell in kept.cells][:index:2], count))
 

@@ -14,6 +14,7 @@ from wildlab.flight.store import save_flight
 from wildlab.paths import REPORTS
 from wildlab.runner import evaluate
 from wildlab.runner.job import Job, other_reports, typed, typed_in_report
+from wildlab.runner.scheduling import Outcome
 
 
 @given(st.lists(st.text(min_size=1).filter(lambda one: "\0" not in one)))
@@ -43,14 +44,10 @@ def test_a_report_that_failed_is_asked_for_again_as_it_was(tmp_path, monkeypatch
     (tmp_path / "s.toml").write_text("[targets]\nstart_speed_m_s = 4.0\n", encoding="utf-8")
     jobs: list[Job] = []
 
-    def keep(job: Job, *_: Any, **__: Any) -> None:
-        jobs.append(job)
+    def keep_all(some: list[Job], *_: Any, **__: Any) -> list[Outcome]:
+        jobs.extend(some)
+        return [Outcome(one.name, "done", 0.0) for one in some]
 
-    def keep_all(passes: list[list[Job]], *_: Any, **__: Any) -> list[Any]:
-        jobs.extend(job for one in passes for job in one)
-        return []
-
-    monkeypatch.setattr(evaluate, "run_alone", keep)
     monkeypatch.setattr(evaluate, "run_all", keep_all)
     told: dict[str, Any] = {"settings": Path("s.toml"), "sensors": ("radar",), "into": tmp_path / "out"}
     evaluate.track_flight(folder, filters=("ekf", "ukf"), smooth=True, **told)

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from wildlab.analysis.georeference import camera_poses, observe, truth_of
 from wildlab.errors import WildlabError
 from wildlab.evaluation.streams import FINE, HARMFUL, Pace, pace_of, runs_of, vibration_of
-from wildlab.flight.checks.check import Finding, Use, find, usable_for
+from wildlab.flight.checks.check import Finding, Use, problems_of, usable_for
 from wildlab.flight.clocks import frame_poses, frame_times, gimbal_angles, gnss_times, longest_gap
 from wildlab.flight.schema import POSITION, QUATERNION, VELOCITY
 from wildlab.flight.store import Flight
@@ -608,8 +608,9 @@ def look_over(flight: Flight, source: str | None = None) -> Overview:
         pace for pace in streams.values() if pace.n
     ]
     length = max(p.end for p in carried) - min(p.begin for p in carried) if carried and timed else np.nan
-    path = _path(flight, source)
+    path = path_of(flight, source)
     vibration = _vibration(flight)
+    problems = problems_of(flight)
     return Overview(
         flight=flight,
         source=source,
@@ -624,8 +625,8 @@ def look_over(flight: Flight, source: str | None = None) -> Overview:
         coverage=cover_images(flight, source),
         detections=detections_of(flight, source),
         lost=tuple(sorted(lost_data(flight, source, streams), key=lambda one: -one.share)),
-        uses=tuple(usable_for(flight)),
-        problems=tuple(one for one in find(flight, meaning=False) if one.level == "problem"),
+        uses=tuple(usable_for(flight, problems)),
+        problems=problems,
     )
 
 
@@ -649,7 +650,8 @@ def paces(flight: Flight) -> dict[str, Pace]:
     return found
 
 
-def _path(flight: Flight, source: str | None) -> Path | None:
+def path_of(flight: Flight, source: str | None) -> Path | None:
+    """Where it went by these poses; without any by its receiver, else the way of its first target."""
     tables: dict[str, tuple[pd.DataFrame, Array | None]] = {}
     if source is not None:
         tables[f"nav/{source}"] = flight.nav[source], None

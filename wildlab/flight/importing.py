@@ -16,7 +16,7 @@ from pydantic import BaseModel
 
 from wildlab.errors import WildlabError
 from wildlab.flight.calibration_files import read_camera, read_learnt, refuse_other_camera
-from wildlab.flight.checks.check import find
+from wildlab.flight.checks.check import problems_of
 from wildlab.flight.checks.findings import part_of
 from wildlab.flight.clocks import between, poses_at
 from wildlab.flight.files import TOML_LIMIT, check_model, inside
@@ -327,9 +327,7 @@ def _refuse_problems(flight: Flight, recipe: Recipe, folder: Path) -> None:
         "truth": [*recipe.truth],
         "detections": [*recipe.detections],
     }
-    for finding in find(flight, meaning=False):
-        if finding.level != "problem":
-            continue
+    for finding in problems_of(flight):
         part, used = part_of(finding.table), blocks.get(finding.table, [])
         if finding.code == "all-truth-far":  # either may be the wrong one
             part, used = "poses] or [truth", [*recipe.poses.values(), *used]

@@ -47,6 +47,19 @@ from wildlab.evaluation.shares import FITTED, NO_PREMISE, SHARE_VERDICTS, UNDECI
 VERDICTS = (*SHARE_VERDICTS, NO_PREMISE, UNDECIDABLE, FITTED)
 #: The metric that tells by its subject which poses others were held against; its value is at how many times.
 AGAINST = "compared_with"
+#: A mean outside of its band by less than this factor may be so by chance, where few values are independent.
+NEAR_THE_BAND = 1.5
+
+
+def band_name(name: str, end: str) -> str:
+    """The metric of an end of the band in which the mean of a consistent filter lies.
+
+    Examples
+    --------
+    >>> band_name("nees", "high")
+    'nees_band_high'
+    """
+    return f"{name}_band_{end}"
 
 
 def _plain(value: Any) -> float | int | None:

@@ -70,7 +70,7 @@ def arrange_parts(soup: BeautifulSoup) -> None:
         groups[at if part is None else part].append(node)
     soup.extend(node for part in ORDER for node in groups[part])
     _judge(groups[SUMMARY], groups[VERDICT])
-    for marked in soup.select("[data-part]"):
+    for marked in soup.find_all(None, {"data-part": True}):
         del marked["data-part"]
     _drop_bare_headings(soup)
 
@@ -430,7 +430,7 @@ def finished_page(parts: Sequence[str], *, title: str, name: str, kicker: str, f
 
 
 def _first_look(soup: BeautifulSoup, notice: str) -> None:
-    for one in soup.select(f"[data-part={VERDICT}]"):
+    for one in soup.find_all(None, {"data-part": VERDICT}):
         one.decompose()
     said = BeautifulSoup(notice, "html.parser")
     if soup.find("section", class_="summary") is not None and said.p is not None:

@@ -33,6 +33,7 @@ from wildlab.messages.quantities import NOTHING, length, significant
 from wildlab.reporting.charts import tracks as charts
 from wildlab.reporting.figures import filter_words
 from wildlab.reporting.georeferencing import count_problems, show_contradictions
+from wildlab.reporting.metrics import NEAR_THE_BAND, band_name
 from wildlab.reporting.report import Report, Wording
 
 #: A target tracked by all sensors together may be this many times as far off as by the best one alone.
@@ -50,17 +51,6 @@ _RECORDED = (
 
 
 # -- what is recorded
-
-
-def band_name(name: str, end: str) -> str:
-    """The metric of an end of the band in which the mean of a consistent filter lies.
-
-    Examples
-    --------
-    >>> band_name("nees", "high")
-    'nees_band_high'
-    """
-    return f"{name}_band_{end}"
 
 
 def _subject(row: pd.Series) -> str:

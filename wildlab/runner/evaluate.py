@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Mapping, Sequence
-from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -23,7 +23,7 @@ from wildlab.analysis.tracks.tuning import refuse_same, tune_flights, tuned_text
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic, write_csv
 from wildlab.flight.calibration_files import calibration_toml, read_learnt, refuse_other_camera
-from wildlab.flight.checks.check import Use, find, usable_for
+from wildlab.flight.checks.check import Use, problems_of, usable_for
 from wildlab.flight.files import dump_toml, flight_name
 from wildlab.flight.manifest import FILE_NAME, Settings, read_manifest, read_settings
 from wildlab.flight.store import Flight, load_flight
@@ -32,10 +32,9 @@ from wildlab.reporting.front_page import OwnFlight
 from wildlab.runner.catalogue import StudyEntry, load_studies
 from wildlab.runner.job import Job, other_reports, typed_in_report
 from wildlab.runner.ledger import COMPARISON, build_ledger, finished_metrics, own_flights
-from wildlab.runner.progress import shown
 from wildlab.runner.provenance import provenance_of_flight, read_provenance
 from wildlab.runner.run import make_job, run_all
-from wildlab.runner.scheduling import Outcome, run_jobs
+from wildlab.runner.scheduling import Outcome
 from wildlab.runner.status import read_status
 
 #: Files of a flight that two flights may have in common.
@@ -130,17 +129,17 @@ def evaluate_flight(
     untracked = lacking_for_tracking(flight, uses["tracking"], source)
     if not untracked:
         prepare("-tracking", "tracking.ipynb", {"source": found}, source=source)
-    # The last to be run, since it lists what the others measured, and the first to be read.
+    # The last to be begun, since it lists what the others measured, and the first to be read.
     beside = [job.name for job in jobs]
     reasons = [] if beside[:1] == [flight.name] else [f"georeferencing ({places.why})"]
     reasons += [f"navigation ({unjudged})"] if unjudged else []
     reasons += [f"tracking ({untracked})"] if untracked else []
     about: dict[str, Any] = {"beside": beside, "lacking": reasons, "source": found}
     prepare("-overview", "overview.ipynb", about, source=source)
-    passes = [longest_first(jobs[:-1]), jobs[-1:]]
+    overview = replace(jobs.pop(), after=tuple(beside))
     pages = studies if ledger else None
-    outcomes = run_all(passes, skipped, pages, reports, console, parallel=cores())
-    order = [jobs[-1].name, *beside]
+    outcomes = run_all([*longest_first(jobs), overview], skipped, pages, reports, console, parallel=cores())
+    order = [overview.name, *beside]
     return sorted(outcomes, key=lambda one: order.index(one.name) if one.name in order else len(order))
 
 
@@ -261,8 +260,7 @@ def lacks_only_truth(flight: Flight) -> bool:
         return False
     pixels = detections[detections["kind"] == "pixel"]
     named = "target_id" in pixels and bool(pixels["target_id"].fillna("").ne("").any())
-    whole = not any(one.level == "problem" for one in find(flight, meaning=False))
-    return named and whole and (truth is None or not len(truth))
+    return named and not problems_of(flight) and (truth is None or not len(truth))
 
 
 def lacking_for_navigation(flight: Flight, use: Use) -> str:
@@ -500,17 +498,8 @@ def _run_report(
     job = make_job(
         study, flight=folder, reports=place.parent, notebooks=notebooks, name=place.name, again=again
     )
-    return run_alone(job, studies, place.parent, console, listed=into is None)
-
-
-def run_alone(
-    job: Job, studies: dict[str, StudyEntry], reports: Path, console: Console | None, *, listed: bool
-) -> Outcome:
-    """Run one report; where it is not ``listed``, its folder is one's own and gets no list of others."""
-    if listed:
-        return run_all([[job]], [], studies, reports, console)[0]
-    with shown(console) if console is not None else nullcontext() as listen:
-        return run_jobs([job], listen=listen)[0]
+    # One's own folder gets no list of others.
+    return run_all([job], [], None if into else studies, place.parent, console)[0]
 
 
 def compare_flights(

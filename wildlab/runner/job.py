@@ -16,7 +16,7 @@ import shutil
 import signal
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 from multiprocessing import connection
 from pathlib import Path
@@ -42,6 +42,9 @@ from wildlab.runner.processes import end_with_runner, runner_is_gone
 from wildlab.runner.provenance import changed_notice, collect, footer
 from wildlab.runner.seeds import SeedWork
 from wildlab.runner.status import seal
+
+#: The tag of a notebook's cell that begins once those reports are there that it reads.
+AFTER_OTHERS = "after-others"
 
 
 @dataclass(frozen=True)
@@ -75,6 +78,8 @@ class Job:
     first_look: dict[str, tuple[int, float]] = field(default_factory=dict)
     #: What the page depends on, see `wildlab.runner.seeds.page_key`.
     fingerprint: str = ""
+    #: Jobs of the same run that must have ended before the cell with the tag `AFTER_OTHERS`.
+    after: tuple[str, ...] = ()
     #: Whether the notebook takes no parameters, leaves no numbers, and is shown with its code.
     tutorial: bool = False
 
@@ -292,8 +297,9 @@ _STARTED: list[int] = []
 
 
 def run_notebook(pipe: connection.Connection, job: Job) -> None:
-    """Body of the process. Says ``("stage", (text,))``, ``("cell", (index, count))`` and at last
-    ``("done", None)`` or ``("failed", Failure)``."""
+    """Body of the process. Says ``("stage", (text,))``, ``("cell", (index, count))``, ``("after", None)``
+    where it waits to hear that other jobs have ended, and at last ``("done", None)`` or
+    ``("failed", Failure)``."""
     ended = end_with_runner(lambda: _remove(job))
     try:
         pipe.send(_outcome(pipe, job))
@@ -439,9 +445,12 @@ def _relative(flight: Path | None, job: Job) -> str:
 def _execute(pipe: connection.Connection, job: Job, parameters: dict[str, Any], executed: Path) -> Any:
     from wildlab.runner.shell import execute_notebook
 
-    def on_cell(index: int, count: int) -> None:
+    def on_cell(index: int, count: int, tags: Collection[str]) -> None:
         _STARTED.append(index)
         pipe.send(("cell", (index, count)))
+        if AFTER_OTHERS in tags and job.after:
+            pipe.send(("after", None))
+            pipe.recv()
 
     notebook = read_notebook(Path(job.notebook))
     return execute_notebook(notebook, Path(job.notebook).parent, executed, parameters, on_cell)

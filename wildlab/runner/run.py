@@ -37,7 +37,7 @@ from wildlab.runner.catalogue import (
 from wildlab.runner.job import Job, other_reports, typed_in_report
 from wildlab.runner.ledger import build_ledger
 from wildlab.runner.progress import outcome_line, pass_line, shown
-from wildlab.runner.scheduling import Listener, Outcome, run_jobs
+from wildlab.runner.scheduling import Outcome, run_jobs
 from wildlab.runner.seeds import SeedWork, code_key, make_work, page_key
 from wildlab.runner.status import read_status
 
@@ -254,7 +254,7 @@ def run_studies(
     if everything and apart:
         notes.append(f"Not among all, to be run by name: {', '.join(apart)}.")
     return run_all(
-        [jobs], skipped, studies, reports, console, notes=notes, parallel=parallel, scheduler=scheduler
+        jobs, skipped, studies, reports, console, notes=notes, parallel=parallel, scheduler=scheduler
     )
 
 
@@ -271,7 +271,7 @@ def _notes(chosen: Sequence[StudyEntry], seeds: int | None, scheduler: str | Non
 
 
 def run_all(
-    passes: Sequence[Sequence[Job]],
+    jobs: Sequence[Job],
     skipped: list[Outcome],
     studies: dict[str, StudyEntry] | None,
     reports: Path,
@@ -281,7 +281,7 @@ def run_all(
     parallel: int = 1,
     scheduler: str | None = None,
 ) -> list[Outcome]:
-    """Run what was made ready, one pass after the other, and show how it goes; outcomes as of `run_studies`.
+    """Run what was made ready, and show how it goes; outcomes as of `run_studies`.
 
     The ledger of the studies is written before anything else, from time to time, and at the end, however that
     comes: it says what is there. Without studies there is none.
@@ -297,26 +297,22 @@ def run_all(
             console.print(note, highlight=False, soft_wrap=True)
         for outcome in skipped:
             console.print(outcome_line(outcome), highlight=False, soft_wrap=True)
+        if line := pass_line(jobs):
+            console.print(line, highlight=False, soft_wrap=True)
     written = write()
-    outcomes: dict[str, Outcome] = {}
     try:
-        for jobs in filter(None, passes):
-            if console is not None and (line := pass_line(jobs)):
-                console.print(line, highlight=False, soft_wrap=True)
-            with shown(console) if console is not None else nullcontext() as listen:
+        with shown(console) if console is not None else nullcontext() as listen:
 
-                def tell(name: str, event: str, what: Any, listen: Listener | None = listen) -> None:
-                    nonlocal written
-                    if event == "end" and time.monotonic() - written > LEDGER_EVERY_S:
-                        written = write()
-                    if listen is not None:
-                        listen(name, event, what)
+            def tell(name: str, event: str, what: Any) -> None:
+                nonlocal written
+                if event == "end" and time.monotonic() - written > LEDGER_EVERY_S:
+                    written = write()
+                if listen is not None:
+                    listen(name, event, what)
 
-                ended = run_jobs(jobs, parallel=parallel, scheduler=scheduler, listen=tell)
-            outcomes |= {outcome.name: outcome for outcome in ended}
+            return [*run_jobs(jobs, parallel=parallel, scheduler=scheduler, listen=tell), *skipped]
     finally:
         write()
-    return [*outcomes.values(), *skipped]
 
 
 def _flight_name(folder: Path) -> str:

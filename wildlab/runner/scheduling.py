@@ -69,6 +69,8 @@ class _Study:
     started: float | None = None
     began: str = ""
     cell: int | None = None
+    #: Whether its notebook waits for the jobs that it comes after.
+    waits: bool = False
 
     def __post_init__(self) -> None:
         self.seeds.extend([] if self.work is None else missing_seeds(self.work))
@@ -253,6 +255,11 @@ class _Scheduler:
         for child in self.busy:
             while child.doing is not None and (said := child.hear()) is not None:
                 self.take(child, *said)
+        for child in self.busy:
+            one, job = child.doing[0], child.doing[0].job
+            if one.waits and self.outcomes.keys() >= set(job.after):
+                one.waits = False
+                child.do(child.doing, job.timeout_s, None)
         if self.cluster is not None:
             for (one, seed), said in self.cluster.collect():
                 self.take_seed(one, seed, *said)
@@ -262,6 +269,7 @@ class _Scheduler:
         one, seed = child.doing
         if kind not in ("done", "failed", "lost"):
             one.cell = content[0] if kind == "cell" else one.cell
+            one.waits |= kind == "after"
             self.tell(one.name, kind, content)
             return
         child.doing = None

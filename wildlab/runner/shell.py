@@ -9,7 +9,7 @@ from __future__ import annotations
 import base64
 import contextlib
 import io
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -66,7 +66,7 @@ def execute_notebook(
     folder: Path,
     into: Path | None = None,
     parameters: Mapping[str, Any] | None = None,
-    on_cell: Callable[[int, int], None] = lambda index, count: None,
+    on_cell: Callable[[int, int, Collection[str]], None] = lambda index, count, tags: None,
 ) -> nbformat.NotebookNode:
     """Run the cells of a notebook by papermill, one after the other, until one raises.
 
@@ -81,7 +81,7 @@ def execute_notebook(
     parameters
         What a cell below the one tagged ``parameters`` sets; plain values.
     on_cell
-        Called before each cell with its index, and how many there are.
+        Called before each cell with its index, how many there are, and its tags.
 
     Returns
     -------
@@ -102,7 +102,7 @@ def execute_notebook(
         ran[0] = running
         if into is not None:
             write_notebook(into, running)
-        on_cell(index, count)
+        on_cell(index, count, running.cells[index].metadata.get("tags", ()))
 
     try:
         ran[0] = papermill.execute_notebook(

@@ -5,6 +5,7 @@ Facts come out of the flight's reports; which messages they call for is a rule.
 
 from __future__ import annotations
 
+import contextlib
 import math
 import statistics
 from collections.abc import Iterable, Sequence
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 
 from wildlab.analysis.accuracy import observe_calibrated
 from wildlab.analysis.georeference import FEW_POINTS
-from wildlab.analysis.overview import ALARMS, TROUBLES, Alarm, Gain, look_over
+from wildlab.analysis.overview import ALARMS, TROUBLES, Alarm, Gain, path_of
 from wildlab.analysis.verdict import (
     MOST,
     PARTS,
@@ -47,13 +48,11 @@ from wildlab.messages.catalogue import (
 )
 from wildlab.messages.quantities import nice_length
 from wildlab.reporting.front_page import OwnFlight
+from wildlab.reporting.metrics import NEAR_THE_BAND, band_name
 from wildlab.reporting.text import POLICY, mark_up, read_style, render
-from wildlab.reporting.tracking import band_name
 from wildlab.sharing.tiers import Cell
 
 NAN = math.nan
-#: Errors of tracks that exceed those predicted by no more than this need no warning.
-NEAR_THE_BAND = 1.5
 #: What moves so far, and so far above the ground, flies: no mast of a boat or a car is as high, m.
 FLYING = 30.0
 _TROUBLES = dict(
@@ -596,28 +595,17 @@ def map_of(flight: Flight) -> MapPicture | None:
     MapPicture or None
         None where there is nothing to put on it. Without poses there is no way of the aircraft on it.
     """
-    overview = look_over(flight, None)
-    path = overview.path
-    flown = path is not None and path.who.startswith("nav/")
-    way = path.place[:, :2] if flown and path is not None else np.empty((0, 2))
-    found = MapPicture(way, _seen(flight, overview.source), _true(flight))
+    source, nothing = next(iter(flight.estimated_sources), None), np.empty((0, 2))
+    path = path_of(flight, source)
+    way = path.place[:, :2] if path is not None and path.who == f"nav/{source}" else nothing
+    seen = nothing
+    if source is not None and flight.detections is not None and flight.manifest.camera is not None:
+        with contextlib.suppress(WildlabError):
+            one, _ = observe_calibrated(flight, source)
+            seen = georeference_pixels(one.poses, one.uv, one.plane_down)[:, :2]
+    truth = nothing if flight.truth is None else flight.truth[["north_m", "east_m"]].to_numpy(float)
+    found = MapPicture(way, seen, truth)
     return found if any(np.isfinite(one).any() for one in found) else None
-
-
-def _seen(flight: Flight, source: str | None) -> Array:
-    if source is None or flight.detections is None or flight.manifest.camera is None:
-        return np.empty((0, 2))
-    try:
-        seen, _ = observe_calibrated(flight, source)
-    except WildlabError:
-        return np.empty((0, 2))
-    return georeference_pixels(seen.poses, seen.uv, seen.plane_down)[:, :2]
-
-
-def _true(flight: Flight) -> Array:
-    if flight.truth is None:
-        return np.empty((0, 2))
-    return flight.truth[["north_m", "east_m"]].to_numpy(float)
 
 
 def _known_points(points: Array) -> Array:

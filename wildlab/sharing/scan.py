@@ -427,6 +427,7 @@ def phrases_of(words: Iterable[str]) -> tuple[dict[tuple[str, ...], str], list[s
     """
     wanted: dict[tuple[str, ...], str] = {}
     skipped: dict[str, None] = {}
+    written = own_vocabulary() | sheet_words()
     for word in dict.fromkeys(words):
         for piece in (piece for piece in re.split(r"[/\\]", word) if piece.strip()):
             stem = piece.rpartition(".")[0] or piece
@@ -437,7 +438,7 @@ def phrases_of(words: Iterable[str]) -> tuple[dict[tuple[str, ...], str], list[s
                 elif one == piece and phrase:
                     skipped[one] = None
             telling = [part for part in parts_of(stem) if len(part) >= LONG and not part.isdigit()]
-            wanted.update({(part,): word for part in telling if part not in own_vocabulary() | sheet_words()})
+            wanted.update({(part,): word for part in telling if part not in written})
     return wanted, list(skipped)
 
 

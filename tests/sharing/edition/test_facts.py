@@ -12,9 +12,9 @@ from wildlab.analysis.tracks.tracker import score_tracks, track
 from wildlab.analysis.verdict import Gain, numbers_of
 from wildlab.flight.manifest import parse_settings
 from wildlab.reporting import tracking
-from wildlab.reporting.metrics import read_metrics
+from wildlab.reporting.metrics import NEAR_THE_BAND, read_metrics
 from wildlab.reporting.report import open_report
-from wildlab.sharing.edition import NEAR_THE_BAND, facts_of
+from wildlab.sharing.edition import facts_of
 
 ERROR = {
     ("horizontal_error_median", "logged-pose"): {"value": 3.0, "n": 40},

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import difflib
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -155,13 +155,20 @@ def sense_sentences(flight: Flight) -> list[str]:
     return [f"{one.level}: {one.sentence} {one.fix}" for one in found if one.level != "note"]
 
 
-def usable_for(flight: Flight) -> list[Use]:
+def problems_of(flight: Flight) -> tuple[Finding, ...]:
+    """Why a flight, or a table of it, cannot be read."""
+    return tuple(one for one in find(flight, meaning=False) if one.level == "problem")
+
+
+def usable_for(flight: Flight, problems: Sequence[Finding] | None = None) -> list[Use]:
     """What the flight can be used for: georeferencing accuracy, tracking, navigation.
 
     Parameters
     ----------
     flight
         The flight.
+    problems
+        Of `problems_of`, where they are known.
 
     Returns
     -------
@@ -174,7 +181,7 @@ def usable_for(flight: Flight) -> list[Use]:
     >>> [use.usable for use in usable_for(simulate_twin("large-ship", 1))]
     [True, True, False]
     """
-    broken = {finding.table for finding in find(flight, meaning=False) if finding.level == "problem"}
+    broken = {finding.table for finding in (problems_of(flight) if problems is None else problems)}
     good_nav = [name for name in flight.estimated_sources if f"nav/{name}" not in broken]
     scored = _filled(flight, "truth")
     return [
