@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+from rich.console import Console
 
 from tests.analysis.robots import robot_flight
 from tests.notebooks import OPEN, notebook, write
@@ -15,6 +17,7 @@ from wildlab.flight.store import save_flight
 from wildlab.runner import evaluate
 from wildlab.runner.catalogue import StudyEntry
 from wildlab.runner.job import AFTER_OTHERS, Job
+from wildlab.runner.progress import shown
 from wildlab.runner.run import make_job
 from wildlab.runner.scheduling import Outcome, run_jobs
 
@@ -54,3 +57,18 @@ def test_a_cell_that_reads_other_reports_begins_when_they_are_there(tmp_path, pa
         jobs.append(make_job(study, reports=reports, notebooks=tmp_path, name=name))
     jobs[1] = replace(jobs[1], after=("first",))
     assert [(one.state, one.reason) for one in run_jobs(jobs, parallel=parallel)] == [("done", "")] * 2
+
+
+def test_who_waits_hears_what_is_under_way_and_how_long_it_took(monkeypatch):
+    now = [0.0]
+    monkeypatch.setattr("wildlab.runner.progress.time.monotonic", lambda: now[0])
+    console = Console(file=io.StringIO(), width=200)
+    with shown(console) as tell:
+        tell("f", "start", 31.4)
+        tell("f", "cell", (2, 6))
+        for now[0] in (9.0, 11.0, 12.0):
+            tell("", "tick", None)
+    assert console.file.getvalue().splitlines() == [
+        "start f (31 s the last time)",
+        "still f cell 3 of 6, 11 s (31 s the last time)",
+    ]

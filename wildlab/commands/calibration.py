@@ -214,21 +214,31 @@ def _estimate(flight: Flight, images: Path | None, source: str | None) -> Camera
     from wildlab.analysis import fact
     from wildlab.analysis.camera import clock_from_images, clock_from_points
 
+    console = shared.terminal_console()
+
+    def from_points() -> CameraClock:
+        with console.status("trying offsets on known points"):
+            return clock_from_points(flight, source)
+
     if images is None:
-        return clock_from_points(flight, source)
+        return from_points()
+    from rich.progress import track
+
     from wildlab.flight.readers.frames import open_frames
 
     ids = [] if flight.frames is None else [str(one) for one in flight.frames["frame_id"]]
     refused: WildlabError | None = None
     try:
-        found = clock_from_images(flight, open_frames(images, ids=ids), source)
+        frames = open_frames(images, ids=ids)
+        moving = track(frames, "how images move", frames.count, console=console, transient=True)
+        found = clock_from_images(flight, moving, source)
         if found.numbers["certain"]:
             return found
         why = found.facts
     except WildlabError as error:
         refused, why = error, (fact("clock-motion-refused", problem=error.problem),)
     try:
-        other = clock_from_points(flight, source)
+        other = from_points()
     except WildlabError:
         other = None
     if other is None or (refused is None and not other.numbers["certain"]):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
@@ -21,6 +22,8 @@ from rich.table import Column
 from wildlab.runner.job import Job
 
 _STAGES = {"flight": "preparing the flight", "notebook": "starting", "page": "writing the page"}
+#: Where there is no terminal, a line says what is under way after so long without one, s.
+SILENT_S = 10.0
 _ENDS = {"done": "[green]done[/]", "failed": "[red]failed[/]", "skipped": "[yellow]skipped[/]"}
 
 
@@ -40,6 +43,37 @@ def pass_line(jobs: Sequence[Job]) -> str:
     return f"First looks: {looks} of {len(jobs)} reports from few flights" + (
         f", and {whole} in full." if whole else "."
     )
+
+
+class _Steps:
+    """What is under way: the step of each study, since when it runs, and how long it took the last time."""
+
+    def __init__(self) -> None:
+        self._step: dict[str, str] = {}
+        self._began: dict[str, float] = {}
+        #: How long each took the last time, in words with a blank before; "" where that is not known.
+        self.usual: dict[str, str] = {}
+
+    def note(self, name: str, event: str, what: Any) -> None:
+        """Follow an event of `wildlab.runner.scheduling.Listener`."""
+        if event == "start":
+            self._began[name], self._step[name] = time.monotonic(), ""
+            self.usual[name] = "" if what is None else f" ({what:.0f} s the last time)"
+        elif event == "end":
+            self._step.pop(name, None)
+        elif event in ("seed", "cell"):
+            self._step[name] = f"{event} {what[0] + (event == 'cell')} of {what[1]}, "
+        elif event == "stage":
+            self._step[name] = f"{_STAGES[what[0]]}, "
+        elif event in ("note", "after"):
+            self._step[name] = f"{escape(what or 'waiting for the other reports')}, "
+
+    def __str__(self) -> str:
+        now = time.monotonic()
+        return " · ".join(
+            f"[bold]{escape(one)}[/] {step}{now - self._began[one]:.0f} s{self.usual[one]}"
+            for one, step in self._step.items()
+        )
 
 
 @contextmanager
@@ -63,36 +97,36 @@ def shown(console: Console) -> Iterator[Callable[[str, str, Any], None]]:
         *columns, console=console, transient=True, expand=True, speed_estimate_period=600
     ) as progress:
         task = progress.add_task("", total=0)
-        steps: dict[str, str] = {}
+        steps = _Steps()
 
         def tell(name: str, event: str, what: Any) -> None:
+            steps.note(name, event, what)
             if event == "plan":
                 progress.update(task, total=what)
             elif event == "end":
-                steps.pop(name, None)
                 progress.console.print(outcome_line(what), highlight=False, soft_wrap=True)
             elif event in ("seed", "cell"):
-                steps[name] = f"{event} {what[0] + (event == 'cell')} of {what[1]}"
                 progress.advance(task)
-            elif event == "stage":
-                steps[name] = _STAGES[what[0]]
-            elif event in ("start", "note"):
-                steps[name] = escape(what or "")
-            now = " · ".join(f"[bold]{escape(one)}[/] {step}" for one, step in steps.items())
-            progress.update(task, description=now)
+            progress.update(task, description=str(steps))
 
         yield tell
 
 
 def _in_lines(console: Console) -> Callable[[str, str, Any], None]:
-    """A line where a study starts and ends, and one for each quarter of its seeds."""
+    """A line where a study starts and ends, for each quarter of its seeds, and after `SILENT_S`."""
+    steps, last = _Steps(), time.monotonic()
 
     def say(line: str) -> None:
+        nonlocal last
+        last = time.monotonic()
         console.print(line, highlight=False, soft_wrap=True)
 
     def tell(name: str, event: str, what: Any) -> None:
-        if event == "start":
-            say(f"start {escape(name)}")
+        steps.note(name, event, what)
+        if event == "tick" and time.monotonic() - last > SILENT_S:
+            say(f"still {steps}")
+        elif event == "start":
+            say(f"start {escape(name)}{steps.usual[name]}")
         elif event == "seeds":
             missing, count = what
             if count:

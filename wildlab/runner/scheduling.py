@@ -34,6 +34,7 @@ from wildlab.runner.seeds import (
     sweep_seeds,
     write_seed,
 )
+from wildlab.runner.status import read_status
 
 
 @dataclass(frozen=True)
@@ -48,8 +49,9 @@ class Outcome:
 
 
 #: Called with (name, event, what). First of all ("", "plan", how many seeds and cells there are to do); then
-#: for each study "start" None, "seeds" (to compute, all),
-#: "seed" (done, to compute), "note" text, "stage" (text,), "cell" (index, count), "end" Outcome.
+#: for each study "start" seconds of the last time or None, "seeds" (to compute, all),
+#: "seed" (done, to compute), "note" text, "stage" (text,), "cell" (index, count), "end" Outcome; and several
+#: times a second ("", "tick", None).
 Listener = Callable[[str, str, Any], None]
 
 
@@ -84,7 +86,10 @@ class _Study:
         """Note the time of its first step."""
         if self.started is None:
             self.started, self.began = time.monotonic(), _now()
-            tell(self.name, "start", None)
+            last: dict[str, Any] = {}
+            if self.job is not None and self.work is None:  # which of its seeds were there, nobody knows
+                last = read_status(Path(self.job.reports) / self.job.name)
+            tell(self.name, "start", last.get("seconds") if last.get("state") == "done" else None)
             if self.work is not None:
                 tell(self.name, "seeds", (self.count, len(self.work.seeds)))
 
@@ -172,6 +177,7 @@ class _Scheduler:
                 self.hand_out_seeds()
                 connection.wait([child.pipe for child in self.busy], timeout=0.25)
                 self.collect()
+                self.tell("", "tick", None)
         finally:
             for child in self.children:
                 child.end()
