@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from functools import partial
+from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from wildlab.analysis.georeference import covariances_of
@@ -14,7 +15,7 @@ from wildlab.api.tracks import Consistency, Navigation, Tracked
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.flight.store import Flight
-from wildlab.names import figure_name
+from wildlab.reporting.charts.drawing import draw_dots, draw_way, finish
 from wildlab.reporting.charts.flights import error_bands
 from wildlab.reporting.charts.tracks import track_map
 from wildlab.reporting.figures import (
@@ -26,11 +27,11 @@ from wildlab.reporting.figures import (
     map_axes,
     new_figure,
     png_bytes,
-    thinned,
 )
 
 #: More ellipses than this cover one another.
 MOST_ELLIPSES = 200
+_PLACE = ["north_m", "east_m"]
 
 
 def plot(result: Flight | Points | PointErrors | Tracked | Navigation | Consistency) -> Figure:
@@ -61,24 +62,14 @@ def plot(result: Flight | Points | PointErrors | Tracked | Navigation | Consiste
     >>> figure.axes[0].get_xlabel()
     'east (m)'
     """
-    if isinstance(result, Flight):
-        figure = _flight(result)
-    elif isinstance(result, Points):
-        figure = _points(result)
-    elif isinstance(result, PointErrors):
-        figure = _points(result.points)
-    elif isinstance(result, Tracked):
-        figure = _track(result)
-    elif isinstance(result, Navigation):
-        figure = _navigation(result)
-    elif isinstance(result, Consistency):
-        figure = _consistency(result)
-    else:
+    draw: Callable[[Any], Figure] | None = _DRAWN.get(type(result))
+    if draw is None:
         raise WildlabError(
             f"there is no figure of a {type(result).__name__}",
             "give a flight, points, a track, navigation or consistency",
             field="result",
         )
+    figure = draw(result)
     # A figure apart from pyplot's state is shown by a notebook only if it says how.
     figure._repr_png_ = partial(png_bytes, figure)  # type: ignore[attr-defined]
     return figure
@@ -89,44 +80,29 @@ def _flight(flight: Flight) -> Figure:
         raise WildlabError("the flight has neither poses nor truth", "add nav/<source>.parquet", field="nav")
     fig, ax = new_figure(5.6, 5.2)
     for name, nav in flight.nav.items():
-        keep = thinned(len(nav))
-        ax.plot(
-            nav["east_m"][keep], nav["north_m"][keep], lw=1.0, color=colour(name), label=figure_name(name)
-        )
-    if flight.truth is not None:
-        _truth(ax, flight)
-    ax.set_title(f"{flight.name}: paths of the aircraft")
-    ax.legend(loc="best")
-    map_axes(ax)
-    return fig
+        draw_way(ax, nav[_PLACE], colour(name), name, width=1.0)
+    return _map(fig, flight, f"{flight.name}: paths of the aircraft")
 
 
 def _points(points: Points) -> Figure:
     fig, ax = new_figure(5.6, 5.2)
-    xy = points.table[["east_m", "north_m"]].to_numpy(float)
+    north_east = points.table[_PLACE].to_numpy(float)
     swapped = covariances_of(points.table)[:, ::-1, ::-1]  # east first, as the axes have it
-    for row in range(0, len(xy), max(1, -(-len(xy) // MOST_ELLIPSES))):
-        ellipse(ax, xy[row], swapped[row], lw=0.6, alpha=0.5)
-    ax.plot(xy[:, 0], xy[:, 1], ".", ms=3, color=BLUE, mec="none", label="single images, 90 % ellipses")
-    if points.flight.truth is not None:
-        _truth(ax, points.flight)
-    ax.set_title("Detections on the ground")
-    ax.legend(loc="best")
+    for row in range(0, len(swapped), max(1, -(-len(swapped) // MOST_ELLIPSES))):
+        ellipse(ax, north_east[row, ::-1], swapped[row], lw=0.6, alpha=0.5)
+    draw_dots(ax, north_east[:, 1], north_east[:, 0], BLUE, "single images, 90 % ellipses", size=3, alpha=1.0)
+    return _map(fig, points.flight, "Detections on the ground")
+
+
+def _map(fig: Figure, flight: Flight, title: str) -> Figure:
+    """With the true ways of the targets, a title, and the legend below."""
+    (ax,) = fig.axes
+    if flight.truth is not None:
+        for _, rows in flight.truth.groupby("target_id", sort=False):
+            draw_way(ax, rows[_PLACE], colour("truth"), "truth", width=1.1, marker="+" * (len(rows) == 1))
+    ax.set_title(title)
     map_axes(ax)
-    return fig
-
-
-def _truth(ax: Axes, flight: Flight) -> None:
-    for i, (_, rows) in enumerate(flight.table("truth").groupby("target_id", sort=False)):
-        mark = "+" if len(rows) == 1 else ""
-        ax.plot(
-            rows["east_m"],
-            rows["north_m"],
-            marker=mark,
-            color=colour("truth"),
-            lw=1.1,
-            label=None if i else "truth",
-        )
+    return finish(fig)
 
 
 def _track(one: Tracked) -> Figure:
@@ -157,14 +133,8 @@ def _consistency(one: Consistency) -> Figure:
         low, high = chi_square_interval(runs[0].dof)
         highest = high
         for run in runs:
-            ax.plot(
-                run.times - run.times[0],
-                run.values,
-                ".",
-                ms=3,
-                color=BLUE if len(runs) == 1 else GREY,
-                alpha=0.6,
-            )
+            color = BLUE if len(runs) == 1 else GREY
+            draw_dots(ax, run.times - run.times[0], run.values, color, size=3, alpha=0.6)
             highest = max(highest, float(np.nanmax(run.values)))
         log_band(ax, low, high)
         ax.set_ylim(low / 12, 2 * highest)
@@ -172,3 +142,14 @@ def _consistency(one: Consistency) -> Figure:
     strips[0, 0].set_title("Does the filter know how wrong it is?")
     strips[-1, 0].set_xlabel("time (s)")
     return fig
+
+
+#: What draws each kind of result.
+_DRAWN: Mapping[type, Callable[[Any], Figure]] = {
+    Flight: _flight,
+    Points: _points,
+    PointErrors: lambda errors: _points(errors.points),
+    Tracked: _track,
+    Navigation: _navigation,
+    Consistency: _consistency,
+}

@@ -26,8 +26,7 @@ from wildlab.evaluation.replication import KINDS, operating_characteristics
 from wildlab.evaluation.shares import HOLDS, MOSTLY, SHARE_VERDICTS, expected_wrong
 from wildlab.messages.catalogue import fill, load_texts
 from wildlab.paths import DATA
-from wildlab.reporting import published_tables as published
-from wildlab.reporting.published import FIRST_LOOK, Case, Number, StudyStatus
+from wildlab.reporting.published import FIRST_LOOK, Case, StudyStatus
 from wildlab.reporting.published_tables import (
     LONGEST,
     PREDICTED,
@@ -36,6 +35,7 @@ from wildlab.reporting.published_tables import (
     flights_of,
     groups_table,
     published_table,
+    study_verdict,
     summed_up,
     tested_on,
 )
@@ -291,8 +291,6 @@ class Card(NamedTuple):
         Plain text: what is asked, what was found ("" where that is not known), and on what.
     answers
         One for each report that it opens.
-    numbers
-        Published ones that the strip shows.
     picture, alt
         A ``data:`` address and what it shows, or "".
     """
@@ -301,17 +299,8 @@ class Card(NamedTuple):
     sentence: str
     tag: str
     answers: Sequence[Answer]
-    numbers: Sequence[Number] = ()
     picture: str = ""
     alt: str = ""
-
-    @property
-    def strip(self) -> Markup:
-        """Its numbers as marks on the axis."""
-        if not self.numbers:
-            return Markup()
-        ratios = sorted(one.ratio for one in self.numbers if one.ratio is not None)
-        return published.marks_plot(self.numbers, alt=render("strip-alt", ratios=ratios))
 
 
 def case_cards(studies: Iterable[tuple[StudyStatus, Glimpse]], cases: Sequence[Case] = ()) -> list[Card]:
@@ -341,7 +330,6 @@ def _case_card(shows: str, some: Sequence[tuple[StudyStatus, Glimpse]]) -> Card:
         sentence=answer if alone else "",
         tag="; ".join(dict.fromkeys(study_tag(one) for one, _ in some)),
         answers=[_answer(one, alone=alone) for one, _ in some],
-        numbers=published.drawable(n for one, _ in some if one.ran for n in one.counted),
         picture=pictured.picture,
         alt=pictured.alt,
     )
@@ -353,7 +341,7 @@ def _answer(one: StudyStatus, *, alone: bool) -> Answer:
     folder = study.name if one.has_report else ""
     if not one.ran:
         return Answer(name, folder, one.state, "no")
-    found = published.study_verdict(one)
+    found = study_verdict(one)
     return Answer(name, folder, found.word, PILLS[found.level], one.first_look)
 
 
@@ -441,8 +429,6 @@ def front_page(
         waiting=[one.study for one in studies if one.state == "not run"],
         learn=learn,
         checkout=checkout,
-        close=published.MARGIN,
-        marked=any(one.numbers for one in study_cards),
         # How many studies are done is said above.
         counts=_tiles(studies)[1:],
         pages={"flights": FLIGHTS, "partners": PARTNERS, "ledger": LEDGER},

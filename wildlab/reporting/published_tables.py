@@ -1,9 +1,4 @@
-"""Published numbers and claims beside ours: how many of how many, tables, and all numbers at once as dots.
-
-A dot lies on one axis, ours divided by the printed number, logarithmic; the shaded middle is close. It is
-green within the prediction interval of our flights, red and hollow outside. What has no ratio (a signed mean,
-a zero) or was not run is not drawn.
-"""
+"""Published numbers and claims beside ours: how many of how many, and tables."""
 
 from __future__ import annotations
 
@@ -15,7 +10,7 @@ from typing import NamedTuple
 from markupsafe import Markup
 
 from wildlab.evaluation.intervals import LEVEL, false_outside
-from wildlab.evaluation.replication import KINDS, SIZES, Closeness, Compatibility
+from wildlab.evaluation.replication import SIZES, Closeness, Compatibility
 from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY, MOSTLY_NOT, UNDECIDED
 from wildlab.messages.catalogue import fill, load_texts, words_of
 from wildlab.messages.quantities import NOTHING, number, unit_words
@@ -262,10 +257,10 @@ def with_source(text: str, source: str) -> Markup:
     return Markup("{}{}").format(mark_up(text), where)
 
 
-def place(ratio: float, width: float = WIDTH, margin: float = _MARGIN) -> float:
-    """Where a ratio lies on an axis of this width; what lies beyond its ends is put at them."""
+def place(ratio: float) -> float:
+    """Where a ratio lies on the axis; what lies beyond its ends is put at them."""
     share = (math.log(ratio) / math.log(WIDEST) + 1) / 2 if ratio > 0 else 0.0
-    return margin + min(max(share, 0.0), 1.0) * (width - 2 * margin)
+    return _MARGIN + min(max(share, 0.0), 1.0) * (WIDTH - 2 * _MARGIN)
 
 
 def strip(n: Number) -> Markup | str:
@@ -328,55 +323,6 @@ def caption_of(numbers: Sequence[Number]) -> str:
     said = [texts[kind.replace(" ", "-")] for kind in dict.fromkeys(one.kind for one in numbers)]
     sources = listed(list(dict.fromkeys(one.source for one in numbers)))
     return " ".join([*said, texts["signs"], fill(texts["sources"], {}, {"sources": sources})])
-
-
-#: What the axis of marks says, in words; what lies beyond its ends is drawn at them.
-ENDS = ("⅛", "published", "8×")
-#: The margin of most published numbers, the size of an error; it is shaded.
-MARGIN = KINDS["error size"].factor
-#: The axis of marks, and its room above and below, in units of the drawing.
-MARKS_WIDTH, MARKS_HEIGHT, _HALF = 320.0, 34.0, 6.0
-
-
-def drawable(numbers: Iterable[Number]) -> list[Number]:
-    """Those with a ratio."""
-    return [one for one in numbers if one.ratio is not None and one.ratio > 0]
-
-
-def marks_plot(numbers: Iterable[Number], *, alt: str) -> Markup:
-    """Numbers as dots on the axis, an SVG element, and the axis in words below it.
-
-    Parameters
-    ----------
-    numbers
-        Those that cannot be drawn are left out. Neighbours stand higher and lower, so that both are seen.
-    alt
-        What a reader who cannot see it should know.
-    """
-
-    def at(ratio: float) -> float:
-        return place(ratio, MARKS_WIDTH, _HALF)
-
-    reach = MARKS_HEIGHT / 2 - _HALF
-    return render(
-        "marks",
-        alt=alt,
-        width=MARKS_WIDTH,
-        height=MARKS_HEIGHT,
-        axis=[("one" if power == 0 else "axis", at(2.0**power)) for power in range(-3, 4)],
-        ticks=ENDS,
-        near=(at(1 / MARGIN), at(MARGIN)),
-        marks=[
-            (at(one.ratio or 0.0), MARKS_HEIGHT / 2 + reach * (2 * (k * 0.618034 % 1) - 1), _mark(one))
-            for k, one in enumerate(drawable(numbers))
-        ],
-    )
-
-
-def _mark(one: Number) -> str:
-    """The colour of a number's dot: within our flights or, where it has none to be within, close."""
-    near, inside = one.answers
-    return SIGNS.get(near if inside == Compatibility.NOT_JUDGED else inside, ("", ""))[1]
 
 
 def study_verdict(one: StudyStatus) -> Standing:

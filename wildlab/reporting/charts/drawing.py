@@ -235,24 +235,21 @@ class Values(NamedTuple):
     look: str = ""
 
 
-def draw_lines(ax: Axes, x: ArrayLike, lines: Mapping[str, Values], *, bars: bool = False) -> None:
-    """Draw lines with markers and the bands of their intervals, or bars; "" leaves one out of the legend."""
+def draw_lines(ax: Axes, x: ArrayLike, lines: Mapping[str, Values]) -> None:
+    """Draw lines with markers and the bands of their intervals; "" leaves one out of the legend."""
     for name, one in lines.items():
         if one.ends is not None:
             low, high = np.asarray(one.ends, float)
-            if bars:
-                ax.vlines(x, low, high, color=one.color, alpha=0.35, lw=2)
-            else:
-                draw_band(ax, x, low, high, one.color, name if one.middle is None else "", alpha=0.17)
+            draw_band(ax, x, low, high, one.color, name if one.middle is None else "", alpha=0.17)
         if one.middle is not None:
             ax.plot(x, one.middle, one.look or "o-", color=one.color, label=figure_name(name))
 
 
 def lines_chart(
     x: ArrayLike, lines: Mapping[str, Values], xlabel: str, ylabel: str, *, size: Size = (5.6, 3.6),
-    ticks: bool = True, bars: bool = False, **axes: Any,
+    ticks: bool = True, **axes: Any,
 ) -> Figure:  # fmt: skip
-    """Lines over a parameter, each with its band, or with ``bars``.
+    """Lines over a parameter, each with its band.
 
     Parameters
     ----------
@@ -264,7 +261,7 @@ def lines_chart(
         Of `Axes.set`: scales and limits.
     """
     fig, ax = new_figure(*size)
-    draw_lines(ax, x, lines, bars=bars)
+    draw_lines(ax, x, lines)
     ax.set(**axes)
     if axes.get("yscale") == "log":
         plain_numbers(ax.yaxis)
