@@ -13,7 +13,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from wildlab.runner.annotation import ClickServer, Session, open_server
+from wildlab.runner.annotation import ClickServer, Session
 
 HOSTILE = "z<img src=x onerror=alert(1)>.png"
 
@@ -34,7 +34,7 @@ def write_images(folder: Path, *names: str) -> Path:
 @contextlib.contextmanager
 def serving(session: Session) -> Iterator[ClickServer]:
     """A server that answers until the block ends."""
-    server = open_server(session)
+    server = ClickServer(session)
     threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True).start()
     try:
         yield server

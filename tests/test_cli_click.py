@@ -28,7 +28,6 @@ from wildlab.flight.store import load_flight, save_flight
 from wildlab.runner.annotation import (
     ClickServer,
     Session,
-    open_server,
     open_session,
     read_points,
     table_of,
@@ -130,7 +129,7 @@ def test_many_quick_clicks_are_all_saved(browser, images, serve):
 
 
 def test_finishing_ends_the_server(browser, images):
-    server = open_server(open_session(images))
+    server = ClickServer(open_session(images))
     thread = threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True)
     thread.start()
     page = open_page(browser, server.address, [])
@@ -206,7 +205,7 @@ def test_from_a_flight_to_its_detections(tmp_path):
     folder = tmp_path / "flight"
     save_flight(flight, folder)
     write_images(folder / "images", *(f"{one}.png" for one in frames), "extra.png")
-    process, address = start(folder, "--port", "0")
+    process, address = start(folder)
     port, token = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/([\w-]+)/", address).groups()  # type: ignore[union-attr]
     link = http.client.HTTPConnection("127.0.0.1", int(port), timeout=20)
     link.request("GET", f"/{token}/state")

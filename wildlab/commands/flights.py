@@ -196,9 +196,8 @@ def _say(card: Proposal, as_json: bool) -> None:
 @click.command("click")
 @click.argument("flight", type=FOLDER)
 @click.option("--images", type=FOLDER, help="Folder of its images.  [default: images in FLIGHT]")
-@click.option("--port", type=click.IntRange(0, 65535), default=0, help="On 127.0.0.1.  [default: a free one]")
 @click.option("--take", is_flag=True, help="Write what was marked into the flight, as its detections.")
-def click_(flight: Path, images: Path | None, port: int, take: bool) -> None:
+def click_(flight: Path, images: Path | None, take: bool) -> None:
     """Mark points in the images of FLIGHT.
 
     On a page that only this machine can open. What is marked is saved at every click, in FLIGHT.clicks.csv
@@ -217,10 +216,10 @@ def click_(flight: Path, images: Path | None, port: int, take: bool) -> None:
         _take(flight)
         return
     from wildlab.flight.manifest import FILE_NAME
-    from wildlab.runner.annotation import open_server, open_session
+    from wildlab.runner.annotation import ClickServer, open_session
 
     session = open_session(flight, images)
-    server = open_server(session, port)
+    server = ClickServer(session)
     click.echo(server.address)
     click.echo("Open this address in a browser of this machine; Ctrl-C ends.", err=True)
     click.echo(f"What is marked is saved in {shown(session.table)} at every click.", err=True)

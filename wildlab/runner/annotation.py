@@ -396,23 +396,15 @@ _HEADERS = {
 
 
 class ClickServer(ThreadingHTTPServer):
-    """Serves one session.
-
-    Parameters
-    ----------
-    session
-        What is marked.
-    port
-        On 127.0.0.1; 0 for any that is free.
-    """
+    """Serves one session, on any free port of 127.0.0.1."""
 
     daemon_threads = True
 
-    def __init__(self, session: Session, port: int = 0) -> None:
+    def __init__(self, session: Session) -> None:
         self.session = session
         self.token = secrets.token_urlsafe(24)
         self.decoding = threading.BoundedSemaphore(AT_ONCE)
-        super().__init__(("127.0.0.1", port), _Handler)
+        super().__init__(("127.0.0.1", 0), _Handler)
         self.hosts = frozenset(f"{name}:{self.server_port}" for name in ("127.0.0.1", "localhost"))
 
     @property
@@ -424,33 +416,6 @@ class ClickServer(ThreadingHTTPServer):
         """Browsers break off as they like; whatever else happens is the terminal's."""
         if not isinstance(sys.exception(), ConnectionError | TimeoutError):
             super().handle_error(request, client_address)
-
-
-def open_server(session: Session, port: int = 0) -> ClickServer:
-    """A server for a session.
-
-    Parameters
-    ----------
-    session
-        What is marked.
-    port
-        On 127.0.0.1; 0 for any that is free.
-
-    Returns
-    -------
-    ClickServer
-
-    Raises
-    ------
-    WildlabError
-        Where the port is taken.
-    """
-    try:
-        return ClickServer(session, port)
-    except OSError as error:
-        raise WildlabError(
-            f"the port {port} cannot be listened on ({error.strerror})", "choose another", field="--port"
-        ) from None
 
 
 class _Handler(BaseHTTPRequestHandler):

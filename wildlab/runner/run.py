@@ -300,6 +300,8 @@ def run_all(
         if line := pass_line(jobs):
             console.print(line, highlight=False, soft_wrap=True)
     written = write()
+    if not jobs:
+        return skipped
     try:
         with shown(console) if console is not None else nullcontext() as listen:
 
