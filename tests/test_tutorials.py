@@ -181,7 +181,6 @@ def test_all_run_and_their_pages_have_no_faults(tmp_path, faults):
     outcomes = tutorials.run_tutorials(tmp_path, parallel=2)
     assert [(one.name, one.reason) for one in outcomes if one.state != "done"] == []
     pages = [tmp_path / "tutorials" / f"{path.stem}.html" for path in TUTORIALS]
-    assert len(tutorials.tutorial_links(tmp_path)) == len(pages)
     for page in pages:
         text = page.read_text(encoding="utf-8")
         soup = BeautifulSoup(text, "html.parser")

@@ -22,6 +22,7 @@ from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.flight.clocks import longest_gap
 from wildlab.geometry.covariances import ellipse_axes
 from wildlab.geometry.frames import Indices
+from wildlab.messages.quantities import duration
 from wildlab.replay.images import spread_evenly
 from wildlab.replay.scene import (
     Array,
@@ -29,7 +30,6 @@ from wildlab.replay.scene import (
     Points,
     ReplayScene,
     heights,
-    minutes,
     plain,
     relief,
 )
@@ -71,7 +71,7 @@ def page(scene: ReplayScene, shots: Mapping[int, bytes]) -> str:
             policy=POLICY.format(script=_hash(script), style=_hash(style)),
             name=plain(scene.name),
             kind="A simulated flight" if scene.kind == "twin" else "A recorded flight",
-            lasts=minutes(scene.length) if scene.timed else "",
+            lasts=duration(scene.length) if scene.timed else "",
             images=len(scene.views.times) if scene.views is not None else 0,
             filters={one["filter"]: one["colour"] for one in found["tracks"]},
             choices={key: list(dict.fromkeys(one[key] for one in found["tracks"])) for key in _CHOICES},

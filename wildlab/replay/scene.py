@@ -43,12 +43,6 @@ def plain(name: str) -> str:
     return short if len(short) <= MOST_LETTERS else f"{short[: MOST_LETTERS - 1]}…"
 
 
-def minutes(seconds: float) -> str:
-    """``"25 min 3 s"``."""
-    whole = round(seconds)
-    return f"{whole // 60} min {whole % 60} s" if whole >= 60 else f"{whole} s"
-
-
 Array = NDArray[np.float64]
 Names = NDArray[np.object_]
 #: Nodes of the ground along its longer side, at most.

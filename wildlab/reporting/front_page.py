@@ -375,13 +375,6 @@ def flight_card(flight: OwnFlight, glimpse: Glimpse) -> Card:
     )
 
 
-class Learn(NamedTuple):
-    """Something to learn from: its title, and its address, "" where its page is not there yet."""
-
-    title: str
-    address: str
-
-
 def front_page(
     studies: Sequence[StudyStatus],
     *,
@@ -389,7 +382,7 @@ def front_page(
     flight_cards: Sequence[Card] = (),
     flights: int = 0,
     cases: int = 0,
-    learn: Sequence[Learn] = (),
+    learn: Sequence[tuple[str, str]] = (),
     checkout: bool = True,
     code: str = "",
 ) -> str:
@@ -406,7 +399,7 @@ def front_page(
     cases
         How many cases the theses have; 0 where that is not known.
     learn
-        Tutorials and reference, whether their pages are there or not.
+        Titles of tutorials and reference, with the address of those whose page is there, else "".
     checkout
         Whether this is a checkout, whose ``make`` writes these pages.
     code

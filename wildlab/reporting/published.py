@@ -214,7 +214,6 @@ class StudyStatus:
     reason: str = ""
     seconds: float | None = None
     finished: str = ""
-    flight: str = ""
     seeds: int | None = None
     first_look: str = ""
     has_report: bool = False

@@ -16,7 +16,6 @@ from wildlab.reporting.front_page import (
     LEDGER,
     MOST_FLIGHTS,
     PARTNERS,
-    Learn,
     OwnFlight,
     OwnReport,
     case_cards,
@@ -222,17 +221,13 @@ def build_ledger(reports: Path, studies: Mapping[str, StudyEntry]) -> Path:
     return path
 
 
-def _learn(reports: Path) -> list[Learn]:
-    """Tutorials and reference, with an address where the page is there."""
-    there = dict(tutorial_links(reports))
-    titles = [title_of(notebook) for notebook in tutorial_notebooks()]
-    reference = "reference/index.html"
-    found = [Learn(title, there.get(title, "")) for title in titles]
-    if ROOT or (reports / reference).is_file():
-        found.append(
-            Learn("Reference of all functions", reference if (reports / reference).is_file() else "")
-        )
-    return found
+def _learn(reports: Path) -> list[tuple[str, str]]:
+    """Titles of tutorials and reference, with an address where the page is there."""
+    pages = {title_of(path): f"tutorials/{path.stem}.html" for path in tutorial_notebooks()}
+    pages["Reference of all functions"] = "reference/index.html"
+    found = [(title, page if (reports / page).is_file() else "") for title, page in pages.items()]
+    # A wheel cannot write the reference.
+    return found if ROOT or found[-1][1] else found[:-1]
 
 
 def tutorial_notebooks(notebooks: Path = NOTEBOOKS) -> list[Path]:
@@ -247,9 +242,3 @@ def title_of(notebook: Path) -> str:
         if cell.cell_type == "markdown" and first.startswith("# "):
             return str(first[2:].strip())
     return notebook.stem
-
-
-def tutorial_links(reports: Path = REPORTS, notebooks: Path = NOTEBOOKS) -> list[tuple[str, str]]:
-    """Title and address, as seen from ``reports``, of each tutorial whose page is there."""
-    pages = [(path, f"tutorials/{path.stem}.html") for path in tutorial_notebooks(notebooks)]
-    return [(title_of(path), page) for path, page in pages if (reports / page).is_file()]

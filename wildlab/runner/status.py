@@ -130,7 +130,6 @@ def study_status(study: StudyEntry, reports: Path, published: Path = FOLDER) -> 
         reason=reason,
         seconds=status.get("seconds"),
         finished=str(status.get("finished", "")),
-        flight=metrics["flight"] if metrics else "",
         seeds=metrics["seeds"] if metrics else None,
         first_look=look if state == FIRST_LOOK else "",
         has_report=state in ("done", FIRST_LOOK, "failed") and (folder / "report.html").is_file(),

@@ -21,7 +21,7 @@ from wildlab.paths import NOTEBOOKS, REPORTS
 from wildlab.reporting.notebook_pages import read_notebook
 from wildlab.runner.catalogue import load_studies
 from wildlab.runner.job import Job
-from wildlab.runner.ledger import build_ledger, title_of, tutorial_links, tutorial_notebooks
+from wildlab.runner.ledger import build_ledger, title_of, tutorial_notebooks
 from wildlab.runner.progress import shown
 from wildlab.runner.scheduling import Outcome, run_jobs
 
@@ -106,8 +106,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     failed = [outcome for outcome in outcomes if outcome.state != "done"]
     for outcome in failed:
         print(f"failed: {outcome.folder}/report.html")
-    for _, page in tutorial_links(given.out):
-        print(given.out / page)
+    for page in sorted((given.out / "tutorials").glob("*.html")):
+        print(page)
     return 1 if failed else 0
 
 
