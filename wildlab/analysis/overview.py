@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike, NDArray
 from wildlab.analysis.georeference import camera_poses, observe, truth_of
 from wildlab.errors import WildlabError
 from wildlab.evaluation.streams import FINE, HARMFUL, Pace, pace_of, runs_of, vibration_of
-from wildlab.flight.checks.check import Finding, Use, problems_of, usable_for
 from wildlab.flight.clocks import frame_poses, frame_times, gimbal_angles, gnss_times, longest_gap
 from wildlab.flight.schema import POSITION, QUATERNION, VELOCITY
 from wildlab.flight.store import Flight
@@ -525,10 +524,6 @@ class Overview:
         How many, in how many of the images, and how many of their pixels have a place on the ground.
     lost
         Data that are lost, most first.
-    uses
-        What the flight is good for.
-    problems
-        What the checks of its tables have found that cannot be used.
     """
 
     flight: Flight
@@ -544,8 +539,6 @@ class Overview:
     coverage: Coverage | None
     detections: tuple[int, int, int]
     lost: tuple[Gain, ...]
-    uses: tuple[Use, ...]
-    problems: tuple[Finding, ...]
 
     @property
     def detections_in_images(self) -> int:
@@ -597,8 +590,8 @@ def look_over(flight: Flight, source: str | None = None) -> Overview:
     --------
     >>> from wildlab.simulation.twins import simulate_twin
     >>> found = look_over(simulate_twin("large-ship", 1))
-    >>> found.path.who, found.problems
-    ('nav/autopilot', ())
+    >>> found.path.who
+    'nav/autopilot'
     """
     if source is not None:
         flight.pose_source(source)
@@ -610,7 +603,6 @@ def look_over(flight: Flight, source: str | None = None) -> Overview:
     length = max(p.end for p in carried) - min(p.begin for p in carried) if carried and timed else np.nan
     path = path_of(flight, source)
     vibration = _vibration(flight)
-    problems = problems_of(flight)
     return Overview(
         flight=flight,
         source=source,
@@ -625,8 +617,6 @@ def look_over(flight: Flight, source: str | None = None) -> Overview:
         coverage=cover_images(flight, source),
         detections=detections_of(flight, source),
         lost=tuple(sorted(lost_data(flight, source, streams), key=lambda one: -one.share)),
-        uses=tuple(usable_for(flight, problems)),
-        problems=problems,
     )
 
 

@@ -382,14 +382,13 @@ def show_overview(
     gains, numbers
         From `wildlab.analysis.verdict`, and the numbers of the other reports behind them.
     amiss
-        What does not fit together: `wildlab.flight.checks.check.sense_sentences`.
+        What cannot be used, and what does not fit together, in sentences.
     lacking
         Which reports could not be made, and why: clauses.
     judged
         How many of the other reports there are.
     """
     wording = Wording(report, load_texts("overview"))
-    amiss = [*(f"problem: {one.sentence} {one.fix}" for one in overview.problems), *amiss]
     problems = count_problems(amiss)
     possible = possible_gain(numbers)
     counts = counts_of(overview, gains, problems, judged, possible)

@@ -23,7 +23,7 @@ from wildlab.analysis.tracks.tuning import refuse_same, tune_flights, tuned_text
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic, write_csv
 from wildlab.flight.calibration_files import calibration_toml, read_learnt, refuse_other_camera
-from wildlab.flight.checks.check import Use, problems_of, usable_for
+from wildlab.flight.checks.check import Use, problems_of, sense_sentences, sentences_of, usable_for
 from wildlab.flight.files import dump_toml, flight_name
 from wildlab.flight.manifest import FILE_NAME, Settings, read_manifest, read_settings
 from wildlab.flight.store import Flight, load_flight
@@ -86,7 +86,10 @@ def evaluate_flight(
     """
     flight = load_flight(folder)
     studies = load_studies(notebooks / "studies.toml")
-    uses = {use.purpose: use for use in usable_for(flight)}
+    problems = problems_of(flight)
+    uses = {use.purpose: use for use in usable_for(flight, problems)}
+    # Looked for once: every report says it.
+    amiss = sense_sentences(flight)
     jobs: list[Job] = []
     # One choice for all reports; a flight without poses, such as a radar's, has none.
     found = flight.pose_source(source)[0] if source or flight.estimated_sources else ""
@@ -103,13 +106,13 @@ def evaluate_flight(
 
     places = uses["georeferencing accuracy"]
     if places.usable:
-        parameters = {"source": found}
+        parameters: dict[str, Any] = {"source": found, "amiss": amiss}
         applied = calibration or flight.calibration
         if applied is not None:
             learnt = read_learnt(applied)
             refuse_other_camera(flight.manifest, learnt)
             # Its text, not its path: the report can be made again without the file, and names no folder.
-            parameters["calibration"] = calibration_toml(learnt)
+            parameters |= {"calibration": calibration_toml(learnt), "amiss": None}
         prepare("", "georeferencing.ipynb", parameters, source=found, calibration=calibration)
     elif calibration is not None:
         raise WildlabError(
@@ -118,8 +121,8 @@ def evaluate_flight(
             file=folder,
             field="--calibration",
         )
-    elif lacks_only_truth(flight):
-        prepare("", "repeat-sightings.ipynb", {"source": found}, source=found)
+    elif not problems and lacks_only_truth(flight):
+        prepare("", "repeat-sightings.ipynb", {"source": found, "amiss": amiss}, source=found)
     skipped: list[Outcome] = []
     unjudged = lacking_for_navigation(flight, uses["navigation"])
     if not unjudged:
@@ -128,13 +131,14 @@ def evaluate_flight(
         skipped.append(Outcome(f"{flight.name}-navigation", "skipped", 0.0, unjudged))
     untracked = lacking_for_tracking(flight, uses["tracking"], source)
     if not untracked:
-        prepare("-tracking", "tracking.ipynb", {"source": found}, source=source)
+        prepare("-tracking", "tracking.ipynb", {"source": found, "amiss": amiss}, source=source)
     # The last to be begun, since it lists what the others measured, and the first to be read.
     beside = [job.name for job in jobs]
     reasons = [] if beside[:1] == [flight.name] else [f"georeferencing ({places.why})"]
     reasons += [f"navigation ({unjudged})"] if unjudged else []
     reasons += [f"tracking ({untracked})"] if untracked else []
     about: dict[str, Any] = {"beside": beside, "lacking": reasons, "source": found}
+    about["amiss"] = [*sentences_of(problems), *amiss]
     prepare("-overview", "overview.ipynb", about, source=source)
     overview = replace(jobs.pop(), after=tuple(beside))
     pages = studies if ledger else None
@@ -260,7 +264,7 @@ def lacks_only_truth(flight: Flight) -> bool:
         return False
     pixels = detections[detections["kind"] == "pixel"]
     named = "target_id" in pixels and bool(pixels["target_id"].fillna("").ne("").any())
-    return named and not problems_of(flight) and (truth is None or not len(truth))
+    return named and (truth is None or not len(truth))
 
 
 def lacking_for_navigation(flight: Flight, use: Use) -> str:

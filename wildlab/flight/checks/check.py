@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import difflib
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -151,8 +151,12 @@ def sense_sentences(flight: Flight) -> list[str]:
     >>> sense_sentences(simulate_twin("large-ship", 1))
     []
     """
-    found = find(flight, plain=False)
-    return [f"{one.level}: {one.sentence} {one.fix}" for one in found if one.level != "note"]
+    return sentences_of(find(flight, plain=False))
+
+
+def sentences_of(findings: Iterable[Finding]) -> list[str]:
+    """Findings in sentences with the remedy; notes are left out."""
+    return [f"{one.level}: {one.sentence} {one.fix}" for one in findings if one.level != "note"]
 
 
 def problems_of(flight: Flight) -> tuple[Finding, ...]:
