@@ -131,10 +131,23 @@ def fetch(dataset: str | None, as_json: bool) -> None:
     from wildlab.flight import catalog
 
     if dataset is not None:
-        for path in catalog.fetch(dataset, progress=_tell_download):
+
+        def tell(file: str, done: int, count: int) -> None:
+            click.echo(f"getting {file} ({done + 1} of {count})", err=True)
+
+        for path in catalog.fetch(dataset, progress=tell):
             click.echo(shown(path))
         return
-    rows = _datasets(catalog)
+    rows: list[dict[str, Any]] = [
+        {
+            "dataset": name,
+            "fetched": bool(catalog.is_fetched(name)),
+            "title": entry.title,
+            "licence": entry.licence,
+            "source": entry.source,
+        }
+        for name, entry in catalog.read_catalog().items()
+    ]
     if as_json:
         print_json(rows)
     else:
@@ -190,23 +203,6 @@ def doctor(as_json: bool) -> None:
 
 # -- what the commands share
 # ------------------------------------------------------------------------------------
-
-
-def _datasets(catalog: Any) -> list[dict[str, Any]]:
-    return [
-        {
-            "dataset": name,
-            "fetched": bool(catalog.is_fetched(name)),
-            "title": entry.title,
-            "licence": entry.licence,
-            "source": entry.source,
-        }
-        for name, entry in catalog.read_catalog().items()
-    ]
-
-
-def _tell_download(file: str, done: int, count: int) -> None:
-    click.echo(f"getting {file} ({done + 1} of {count})", err=True)
 
 
 def _terminate(number: int, frame: FrameType | None) -> NoReturn:

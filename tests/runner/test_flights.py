@@ -64,9 +64,13 @@ def test_it_is_simulated_again_when_its_parameters_change(tmp_path, simulated, m
 
 
 def studies(folder: Path) -> Path:
-    write(folder, "georeferencing.ipynb", notebook(OPEN, SHOW, more='source = ""'))
+    write(folder, "georeferencing.ipynb", notebook(OPEN, SHOW, more='source = ""\namiss = None'))
     own = OPEN.replace("3.0", "4.0")
-    write(folder, "overview.ipynb", notebook(own, SHOW, more='beside = []\nlacking = []\nsource = ""'))
+    write(
+        folder,
+        "overview.ipynb",
+        notebook(own, SHOW, more='beside = []\nlacking = []\nsource = ""\namiss = None'),
+    )
     text = '[s]\ntitle = "S"\nnotebook = "georeferencing.ipynb"\n'
     text += 'dataset = "openathena"\nrecipe = "openathena.toml"\n'
     (folder / "studies.toml").write_text(text)

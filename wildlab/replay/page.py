@@ -161,17 +161,13 @@ def _way(times: Array, places: Array, rows: Indices) -> dict[str, Any]:
 
 def _judged(of: Points | Estimates, most: int) -> dict[str, Any]:
     rows = spread_evenly(len(of.times), most)
+    long_axis, short_axis, bearing = ellipse_axes(of.covariance[rows])
     return _way(of.times, of.places, rows) | {
-        "ellipses": _rounded(_ellipses(of.covariance[rows])),
+        # Longer and shorter half axis, m, and turn of the longer one from the east, clockwise, rad.
+        "ellipses": _rounded(np.column_stack([long_axis, short_axis, bearing - np.pi / 2])),
         "error": _rounded(of.error[rows]),
         "nees": _rounded(of.nees[rows]),
     }
-
-
-def _ellipses(covariance: Array) -> Array:
-    """(N, 3) longer and shorter half axis, m, and turn of the longer one from the east, clockwise, rad."""
-    long_axis, short_axis, bearing = ellipse_axes(covariance)
-    return np.column_stack([long_axis, short_axis, bearing - np.pi / 2])
 
 
 def _ground(scene: ReplayScene) -> dict[str, Any]:

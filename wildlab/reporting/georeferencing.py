@@ -74,11 +74,6 @@ SUMMARY = {
 }
 
 
-def errors_table(rows: Mapping[str, ErrorSummary]) -> pd.DataFrame:
-    """One row of errors for each summary, with its name in the column ``pose``."""
-    return pd.DataFrame([{"pose": name, **summary._asdict()} for name, summary in rows.items()])
-
-
 def groups_table(groups: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """One row of errors for each scored part of a flight, with images and ellipse coverage."""
     return pd.DataFrame(
@@ -569,7 +564,8 @@ def show_accuracy(
         rows = {texts.subjects["applied" if applied else "logged"]: logged}
         rows |= _other_summaries(found, texts)
         rows |= {texts.subjects["recorded"].format(program): one for program, one in others.items()}
-        wording.table("errors", errors_table(rows))
+        errors = pd.DataFrame([{"pose": name, **summary._asdict()} for name, summary in rows.items()])
+        wording.table("errors", errors)
         wording.table("targets", targets_table(found.by_target))
         report.published(texts.subjects["published"], texts.subjects, {})
     if diagnosis is not None:

@@ -353,10 +353,6 @@ def markdown_html(source: str) -> str:
     return str(MarkdownWithMath(renderer=Renderer(escape=True, exclude_anchor_links=True)).render(source))
 
 
-def _folded(summary: str, html: str) -> str:
-    return f'<details class="plain"><summary>{escape(summary)}</summary>{html}</details>' if html else ""
-
-
 def report_page(
     notebook: NotebookNode,
     *,
@@ -395,7 +391,7 @@ def report_page(
         _first_look(soup, notice)
     if alert and soup.header is not None:
         soup.header.insert_after(BeautifulSoup(alert, "html.parser"))
-    cited = cited_theses(soup.get_text(" "))
+    about = footer + cited_theses(soup.get_text(" "))
     arrange_parts(soup)
     explain_words(soup)
     # A page that is mailed alone has nothing beside it: the way to the ledger is words, not a link.
@@ -403,7 +399,9 @@ def report_page(
         title=soup.h1.get_text(" ", strip=True) if soup.h1 else study,
         body=str(soup),
         kicker=" · ".join(filter(None, [f"wildlab › {escape(study)}", escape(made[:10])])),
-        footer=_folded("How to reproduce this page", footer + cited),
+        footer=f'<details class="plain"><summary>How to reproduce this page</summary>{about}</details>'
+        if about
+        else "",
     )
     examine(whole, study)
     return whole

@@ -89,7 +89,8 @@ def plan_page(
     place = wording.say(texts["exact"], {"origin": origin_text(plan)}) if exact else texts["withheld"]
     report.head(title, f"{names}; {place}")
     against = " ".join(result["warnings"])
-    found = "look-closer" if against else finding_of(plan)
+    sound = "battery-unchecked" if plan.wanted.battery_min is None else "no-objection"
+    found = "look-closer" if against else sound
     reason = against or wording.texts.answers[found]
     level = "warn" if against else "neutral"
     report.summary(result["sentences"], level=level, verdict=(texts[found], reason))
@@ -103,11 +104,6 @@ def plan_page(
     report.section(texts["assumed"])
     report.points(result["assumed"])
     return finished_page(report.parts, title=title, name="plan", kicker="wildlab › plan")
-
-
-def finding_of(plan: Plan) -> str:
-    """What the checks of a plan come to that nothing speaks against."""
-    return "battery-unchecked" if plan.wanted.battery_min is None else "no-objection"
 
 
 def _tiles(plan: Plan, result: Mapping[str, Any], wording: Wording) -> list[tuple[str, str]]:

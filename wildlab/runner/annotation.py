@@ -84,8 +84,8 @@ class Session:
     _lock: Lock = field(default_factory=Lock, repr=False)
 
     def name_of(self, number: int) -> str:
-        """What the image of a number is called in the table."""
-        return shown_name(self.images[number])
+        """What the image of a number is called in the table: the name of its file, on one line."""
+        return printable(file_name(self.images[number])).strip()
 
     def state(self) -> dict[str, Any]:
         """All that the page shows, but for the pictures, as JSON has it."""
@@ -190,11 +190,6 @@ def open_session(folder: Path, images: Path | None = None) -> Session:
     used = dict.fromkeys(one.name for several in points.values() for one in several if one.name)
     names += [one for one in used if one not in names]
     return Session(files, table, points, names, file_name(folder.resolve()))
-
-
-def shown_name(path: Path) -> str:
-    """What an image is called: the name of its file, on one line."""
-    return printable(file_name(path)).strip()
 
 
 def table_of(folder: Path) -> Path:

@@ -142,7 +142,9 @@ def evaluate_flight(
     prepare("-overview", "overview.ipynb", about, source=source)
     overview = replace(jobs.pop(), after=tuple(beside))
     pages = studies if ledger else None
-    outcomes = run_all([*longest_first(jobs), overview], skipped, pages, reports, console, parallel=cores())
+    # The last one waits least like this, where there are fewer cores than jobs.
+    jobs.sort(key=lambda job: LONGEST_FIRST.index(Path(job.notebook).name))
+    outcomes = run_all([*jobs, overview], skipped, pages, reports, console, parallel=cores())
     order = [overview.name, *beside]
     return sorted(outcomes, key=lambda one: order.index(one.name) if one.name in order else len(order))
 
@@ -168,11 +170,6 @@ def tell_source(flight: Flight, source: str | None, console: Console | None) -> 
     if console is not None and source is None and len(known) > 1:
         others = ", ".join(known[1:])
         console.print(f"Poses: {known[0]} (--source takes another: {others}).", markup=False, highlight=False)
-
-
-def longest_first(jobs: Sequence[Job]) -> list[Job]:
-    """The jobs in the order that leaves the last one waiting least, where there are fewer cores than jobs."""
-    return sorted(jobs, key=lambda job: LONGEST_FIRST.index(Path(job.notebook).name))
 
 
 def cores() -> int:
@@ -201,7 +198,7 @@ def refuse_other_flight(folder: Path, report: Path) -> None:
     """
     there = read_provenance(report).get("flight") or {}
     mine = provenance_of_flight(folder)
-    if _contents(there) and not _same(there, mine):
+    if (there.get("files") or there.get("sources")) and not _same(there, mine):
         raise WildlabError(
             f"there is a report of another flight named {mine['name']!r}: they share none of the aircraft's "
             "tables, and have other raw files",
@@ -229,10 +226,6 @@ def left_from_before(folder: Path, reports: Path) -> list[Path]:
     return [
         reports / one.folder for own in own_flights(reports, ()) if own.name == name for one in own.earlier
     ]
-
-
-def _contents(flight: Mapping[str, Any]) -> set[str]:
-    return {*flight.get("files", {}).values(), *flight.get("sources", ())}
 
 
 def _same(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:

@@ -352,7 +352,8 @@ def _work(pipe: connection.Connection, job: Job) -> None:
     started = time.monotonic()
     folder = Path(job.work)
     pipe.send(("stage", ("flight",)))
-    flight, others = _flight(job), _others(job)
+    flight = _flight(job)
+    others = [dataset_flight(job.dataset, recipe, Path(job.reports)) for recipe in job.beside]
     given: dict[str, Any] = {**job.parameters, "study": job.name, "seed": job.seed}
     origin = collect(
         study=job.name,
@@ -423,11 +424,6 @@ def _flight(job: Job) -> Path | None:
     if job.recipe:
         return dataset_flight(job.dataset, job.recipe, Path(job.reports))
     return None
-
-
-def _others(job: Job) -> list[Path]:
-    """The further flights of a study."""
-    return [dataset_flight(job.dataset, recipe, Path(job.reports)) for recipe in job.beside]
 
 
 def _relative(flight: Path | None, job: Job) -> str:

@@ -615,11 +615,14 @@ def _known_points(points: Array) -> Array:
 
 def picture_html(picture: MapPicture | None, language: Language) -> str:
     """A ``<figure>`` with the map and its caption, or nothing where there is nothing to draw."""
-    if picture is None or len(_known_points(picture.path)) + len(_known_points(picture.seen)) < 2:
+    if picture is None:
         return ""
-    seen, begin = _known_points(picture.seen), _known_points(picture.path)[:1]
+    way, seen, truth = map(_known_points, picture)
+    if len(way) + len(seen) < 2:
+        return ""
+    begin = way[:1]
     # No point that is kilometres off, of whatever it is, shrinks the rest; nor does one who walked elsewhere.
-    near = np.concatenate([_usual(one) for one in (_known_points(picture.path), seen) if len(one)])
+    near = np.concatenate([_usual(one) for one in (way, seen) if len(one)])
     low, high = near.min(axis=0), near.max(axis=0)
     size = np.maximum(high - low, 5.0)
     scale = float((np.array([HEIGHT - FOOT - 2 * MARGIN, WIDTH - 2 * MARGIN]) / size).min())
@@ -628,7 +631,7 @@ def picture_html(picture: MapPicture | None, language: Language) -> str:
         offset = (np.asarray(points, float).reshape(-1, 2) - (low + high) / 2) * scale
         return np.stack([WIDTH / 2 + offset[:, 1], (HEIGHT - FOOT) / 2 - offset[:, 0]], axis=1)
 
-    dots = {"seen": (_dots(place(seen)), 4.2), "true": (_dots(place(_known_points(picture.truth))), 3.0)}
+    dots = {"seen": (_dots(place(seen)), 4.2), "true": (_dots(place(truth)), 3.0)}
     keys = [("way", "path"), ("start", "start")] * bool(len(begin)) + [("seen", "seen")] * bool(len(seen))
     keys += [("true", "truth")] * bool(len(dots["true"][0]))
     values = {"way": length(float(size[1]))}

@@ -449,15 +449,18 @@ def generalise(flight: Flight, treatment: Treatment, name: str = "flight") -> Ge
         table = _moved(table, shift, start - (folded[f"{offset}_offset_s"] if offset else 0.0))
         # Another clock's stamps tell the zone, and no report looks at them.
         tables[key] = table.drop(columns="time_onboard_s", errors="ignore")
-    field = manifest.magnetometer.hard_iron_ut
-    iron = None if field is None or "magnetometer" not in tables else tuple(stretch * one for one in field)
+    field: dict[str, Any] = {}
+    if "magnetometer" in tables:
+        field = {"declination_deg": USUAL_DECLINATION_DEG, "inclination_deg": USUAL_INCLINATION_DEG}
+        if (iron := manifest.magnetometer.hard_iron_ut) is not None:
+            field["hard_iron_ut"] = tuple(stretch * one for one in iron)
     epoch, when = _date(manifest, first_pose(flight), treatment)
     data = _manifest(manifest, names, clocks, name, pixels)
     if camera is not None:
         data["camera"] = camera.model_dump()
     data["origin"] = {"latitude_deg": there[0], "longitude_deg": there[1], "height_m": 0.0}
     data["time"] = {"kind": manifest.time.kind} | ({"epoch": epoch} if epoch else {})
-    data["magnetometer"] = _field_part(iron, "magnetometer" in tables)
+    data["magnetometer"] = field
     terrain = flight.terrain
     if terrain is not None:
         # Moved as the rest is; what a report draws of it is only what the flight itself shows.
@@ -673,11 +676,6 @@ def _sensor(part: SensorPart, pixels: float) -> dict[str, Any]:
     data = part.model_dump(exclude_none=True, exclude_unset=True)
     scale_pixels(data.get("noise", {}), pixels)
     return data
-
-
-def _field_part(iron: tuple[float, ...] | None, there: bool) -> dict[str, Any]:
-    field = {"declination_deg": USUAL_DECLINATION_DEG, "inclination_deg": USUAL_INCLINATION_DEG}
-    return (field if there else {}) | ({"hard_iron_ut": iron} if iron is not None else {})
 
 
 def list_removals(flight: Flight, made: Flight, names: Names) -> list[str]:
