@@ -64,12 +64,18 @@ def test_known_points_tell_it_where_motion_does_not(motion, points, said, tmp_pa
     assert ("points" in told) == (told != "motion say so.")
 
 
-@pytest.mark.slow
-def test_a_clock_that_is_set_takes_the_place_of_a_calibration_s(tmp_path):
-    late = LearntParameter(name="clock", value=0.3, low=0.2, high=0.4, unit="s")
+@pytest.fixture(scope="module")
+def late():
+    """A flight whose camera's clock is late, and what is learnt of it."""
     flight = simulate(Survey(images=12, clock_s=0.5))
-    kept = learn_flight(flight, np.random.default_rng(0))[0]
-    kept = kept.model_copy(update={"parameter": (late,), "covariance": ((0.0025,),)})
+    return flight, learn_flight(flight, np.random.default_rng(0))[0]
+
+
+@pytest.mark.slow
+def test_a_clock_that_is_set_takes_the_place_of_a_calibration_s(late, tmp_path):
+    clock = LearntParameter(name="clock", value=0.3, low=0.2, high=0.4, unit="s")
+    flight, kept = late
+    kept = kept.model_copy(update={"parameter": (clock,), "covariance": ((0.0025,),)})
     folder = save_flight(flight, tmp_path / "flight", calibration=kept).folder
     assert as_calibrated(load_flight(folder)).manifest.clocks.camera_offset_s == pytest.approx(0.3)
     # An offset that happens to be that of the flight it was learnt on, too.
@@ -84,9 +90,8 @@ def test_a_clock_that_is_set_takes_the_place_of_a_calibration_s(tmp_path):
     ("stated", "learnt_with", "adds"),
     [(0.0, 0.0, True), (-7200.0, 0.0, True), (0.2, 0.2, True), (0.4, 0.0, False), (3600.4, 0.0, False)],
 )
-def test_a_calibration_s_clock_is_no_second_one(stated, learnt_with, adds):
-    flight = simulate(Survey(images=12, clock_s=0.5))
-    learnt = learn_flight(flight, np.random.default_rng(0))[0]
+def test_a_calibration_s_clock_is_no_second_one(late, stated, learnt_with, adds):
+    flight, learnt = late
     (clock,) = learnt.parameter
     assert clock.name == "clock"
     there = learnt.learnt_on.model_copy(update={"camera_offset_s": learnt_with})
