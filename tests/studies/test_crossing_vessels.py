@@ -49,7 +49,7 @@ def flown(flight):
     looks = photograph("crossing-vessels", 6, flight, 2)
     appearance = dressed(crossing, looks, 6)
     banks = {DISTANCE: run_bank(crossing.detections), FEATURES: run_bank(crossing.detections, appearance)}
-    return study.Flown(crossing, looks, banks)
+    return study.Flown(crossing, looks, appearance, banks)
 
 
 def passing(images=600, closest=0.0, noise=0.0, seed=0):

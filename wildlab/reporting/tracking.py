@@ -33,7 +33,7 @@ from wildlab.messages.quantities import NOTHING, length, significant
 from wildlab.reporting.charts import tracks as charts
 from wildlab.reporting.figures import filter_words
 from wildlab.reporting.georeferencing import count_problems, show_contradictions
-from wildlab.reporting.metrics import NEAR_THE_BAND, band_name
+from wildlab.reporting.metrics import band_name
 from wildlab.reporting.report import Report, Wording
 
 #: A target tracked by all sensors together may be this many times as far off as by the best one alone.

@@ -505,7 +505,7 @@ def looks_of(looks: list[Array]) -> Numbers:
 OWN_M, SHARED_M = 2.0, 10.2
 
 
-def join(crossing: Crossing, looks: Appearance, rule: str) -> Numbers:
+def join(crossing: Crossing, features: Array, rule: str) -> Numbers:
     """What both vessels as one state give by a rule of `RULES`: each detection's error its own, part of it
     shared by those of an image, and with features.
 
@@ -518,7 +518,7 @@ def join(crossing: Crossing, looks: Appearance, rule: str) -> Numbers:
     rows = np.arange(started[-1] + 1, len(seen.image))
     motion = cache(partial(_motion, interval=seen.interval))
     F, Q = (np.array(part) for part in zip(*map(motion, np.diff(images[both:]).tolist()), strict=True))
-    unlike = feature_distances(looks.features[rows], looks.features[started], np.sqrt(2) * looks.sd)
+    unlike = feature_distances(features[rows], features[started], np.sqrt(2) * TOLD_SD)
     x = np.pad(seen.positions[started], ((0, 0), (0, 2)))
     numbers: Numbers = {}
     for name, own, shared, weighed in (
@@ -526,7 +526,7 @@ def join(crossing: Crossing, looks: Appearance, rule: str) -> Numbers:
         ("shared", OWN_M, SHARED_M, 0.0),
         ("features", OWN_M, SHARED_M, 1.0),
     ):
-        alone = np.diag(np.square([own, own, TUNING.velocity_0, TUNING.velocity_0]))
+        alone = np.diag(np.square([own, own, VELOCITY_0, VELOCITY_0]))
         P = np.kron(np.eye(2), alone) + np.kron(np.ones((2, 2)), np.diag(np.square([shared, shared, 0, 0])))
         scans = JointScans(seen.positions[rows], count[both + 1 :], F, Q, own, shared, weighed * unlike)
         track = np.full(len(seen.image), -1)
@@ -538,10 +538,11 @@ def join(crossing: Crossing, looks: Appearance, rule: str) -> Numbers:
 
 
 class Flown(NamedTuple):
-    """What a flight's camera saw of the two, how they looked, and H's tracks."""
+    """What a flight's camera saw of the two, how they looked, features of detections, and H's tracks."""
 
     crossing: Crossing
     looks: list[Array]
+    features: Array
     banks: dict[str, Bank]
 
 
@@ -549,14 +550,15 @@ def fly(seed: int, twin: str, images: int, flight: Flight | None = None) -> Flow
     """One simulated flight through every rule; ``flight`` where it is at hand."""
     flight = flight or simulate_twin(twin, seed, ("imu", "gnss"))
     crossing, looks = gather(flight), photograph(twin, seed, flight, images)
-    rules = {DISTANCE: None, FEATURES: dressed(crossing, looks, seed)}
+    features = dressed(crossing, looks, seed)
+    rules = {DISTANCE: None, FEATURES: features}
     banks = {name: run_bank(crossing.detections, how) for name, how in rules.items()}
-    return Flown(crossing, looks, banks)
+    return Flown(crossing, looks, features, banks)
 
 
 def all_numbers(flown: Flown) -> Numbers:
     """What the trial gives of a flight that was flown."""
-    joint = (join(flown.crossing, flown.appearance, rule) for rule in RULES)
+    joint = (join(flown.crossing, flown.features, rule) for rule in RULES)
     return {
         **numbers_of(flown.crossing, flown.banks),
         **looks_of(flown.looks),
