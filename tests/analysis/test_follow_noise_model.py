@@ -159,6 +159,28 @@ def test_units_and_axes_are_a_matter_of_taste_and_gross_errors_of_nobody():
     assert spoilt.time_s == pytest.approx(found.time_s, rel=0.2)
 
 
+def test_near_looks_are_not_gross_for_what_a_place_that_is_off_does_to_their_bearing():
+    """From 10 m to a kilometre away; the platform is 2 m off, and nothing else lasts."""
+    errors = []
+    for seed in range(12):
+        rng, n = np.random.default_rng(seed), 200
+        times, away = np.arange(float(n)), np.exp(rng.uniform(np.log(10.0), np.log(1000.0), n))
+        off, H = rng.normal(0, 2.0, (n, 2)), np.zeros((n, 2, 4))
+        for row in range(1, n):
+            off[row] = np.exp(-1 / 10) * off[row - 1] + np.sqrt(1 - np.exp(-2 / 10)) * off[row]
+        azimuth = rng.uniform(-np.pi, np.pi, n)
+        H[:, 0, :2] = -np.column_stack([np.cos(azimuth), np.sin(azimuth)])
+        H[:, 1, :2] = np.column_stack([np.sin(azimuth), -np.cos(azimuth)]) / away[:, None]
+        H[:, 1, 2] = H[:, 0, 3] = 1.0
+        white = rng.normal(size=(n, 2)) * [0.3, 0.002]
+        errors.append(Errors(times, np.einsum("nij,nj->ni", H[..., :2], off) + white, H))
+    found = fit_noise(errors, [[0, 1], [2], [3]], ("range", "azimuth"))
+    assert found.lasting[0] == pytest.approx(2.0, rel=0.15) and found.white[1] == pytest.approx(
+        0.002, rel=0.3
+    )
+    assert found.lasting[2] < np.radians(0.2) and found.lasting[3] < 0.7
+
+
 def test_of_white_errors_little_is_put_down_to_what_lasts():
     for seed in range(10):
         rng = np.random.default_rng(seed)

@@ -464,7 +464,8 @@ def _noise(
 def _considered(
     flight: Flight, scans: Scans, settings: Settings, found: NoiseModel | None, by_tuning: str
 ) -> list[tuple[ConsideredError, str]]:
-    """Each with who says so: what is stated, and what was tuned beside it; else the platform's."""
+    """Each with who says so: what is stated, and what was tuned beside it; else the platform's, unless all
+    that lasts was tuned as each target's own."""
     part = settings.sensors.get(scans.sensor, SensorPart())
     stated, named = list[ConsideredError](), set[str]()
     for name, one in part.considered.items():
@@ -482,7 +483,9 @@ def _considered(
     tuned = [] if found is None else [one for one in found.considered if one.name not in named]
     if stated or tuned:
         return [(one, STATED) for one in stated] + [(one, by_tuning) for one in tuned]
-    if scans.poses is not None and scans.poses.covariance is not None:
+    if (scans.poses is not None and scans.poses.covariance is not None) or (
+        found is not None and found.lasting
+    ):
         return []
     stated_sds = {
         name: (getattr(flight.manifest.uncertainty, key), key.endswith("deg"))

@@ -45,7 +45,7 @@ from wildlab.analysis.tracks.scans import (
 from wildlab.analysis.tracks.single_target import choose
 from wildlab.analysis.tracks.tracker import read_inputs
 from wildlab.errors import WildlabError
-from wildlab.evaluation.consistency import worth
+from wildlab.evaluation.consistency import worth, worth_of_errors
 from wildlab.flight.manifest import Settings
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
@@ -230,7 +230,8 @@ def _clock(
     best, where = now, offsets[::COARSE]
     for _ in range(2):
         errors = errors_at(best)
-        scale, number = _scale([one.error for one in errors]), _independent(errors, at_rest)
+        scale = _scale([one.error for one in errors])
+        number = _independent(errors, scale, at_rest)
         found = {o: number * _halves(errors_at(o), scale) / 2 for o in sorted({*where.tolist(), now})}
         best = min(found, key=lambda one: found[one].sum())
         at = int(np.argmin(np.abs(offsets - best)))
@@ -239,12 +240,13 @@ def _clock(
     whole = costs.sum(axis=1)
     # As Student's t has it: of few independent errors their size is known badly, too.
     drop = float(student_t.ppf(0.975, max(number.sum() - 1, 1.0))) ** 2 / 2
-    near = tried[whole <= whole.min() + drop]
+    near, half = tried[whole <= whole.min() + drop], float(np.diff(offsets[:2])[0]) / 2
+    low, high = float(near.min()) - half, float(near.max()) + half
     of_other = costs[costs.argmin(axis=0)[::-1], [0, 1]]
     agreed = not at_rest or (found[now] > of_other).all()
     if agreed and whole[tried == now] > whole.min() + drop:
-        return best, float(near.min()), float(near.max())
-    return now, min(float(near.min()), now), max(float(near.max()), now)
+        return best, low, high
+    return now, min(low, now), max(high, now)
 
 
 def _scale(errors: Sequence[Array]) -> Array:
@@ -264,14 +266,15 @@ def _halved(errors: list[Errors]) -> tuple[list[Errors], list[Errors]]:
     return [errors[0].only(slice(middle))], [errors[0].only(slice(middle, None))]
 
 
-def _independent(errors: list[Errors], together: bool) -> Array:
+def _independent(errors: list[Errors], scale: Array, together: bool) -> Array:
     """(2,) how many independent errors those of either half are worth: each target's by themselves, or all
     one after the other. Those that are missed count like the others."""
     known = [one.error[one.known] for one in errors]
     if together:
         order = np.argsort(np.concatenate([one.times[one.known] for one in errors]), kind="stable")
         known = [np.concatenate(known)[order]]
-    each = [max(map(worth, one.T)) for one in known if len(one)]
+    # About their mean for what changes, and about zero for what does not: a constant error is one.
+    each = [min(max(map(worth, one.T)), worth_of_errors(one / scale)) for one in known if len(one)]
     share = float(sum(each) / max(sum(map(len, known)), 1))
     return np.array(
         [share * sum((~np.isnan(one.error)).all(axis=1).sum() for one in half) for half in _halved(errors)]
@@ -327,35 +330,70 @@ def fit_noise(errors: Sequence[Errors], groups: Sequence[list[int]], elements: S
     kind = np.array([kinds.index(NOISE_OF[name]) for name in elements])
     spreads = _scale([one.error for one in errors])
     scale = np.array([np.sqrt(np.mean(spreads[kind == number] ** 2)) for number in range(len(kinds))])[kind]
-    m, size = len(elements), len(kinds) + len(groups)
-    gram, product = np.zeros((len(LAGS_S), size, size)), np.zeros((len(LAGS_S), size))
-    white = np.diag(1 / scale**2) @ np.eye(len(kinds))[kind]
-    gaps = []
-    for one in errors:
-        good = one.known & (np.abs(one.error) < GROSS * scale).all(axis=1)
-        t, error, H = one.only(good).only(slice(MOST_ERRORS))
-        e, H, apart = error / scale, H / scale[:, None], 0
+    some = [
+        one.only(good).only(slice(MOST_ERRORS))
+        for one, good in zip(errors, _plausible(errors, scale, groups), strict=True)
+    ]
+    found = _fit(some, [np.broadcast_to(scale, one.error.shape) for one in some], groups, kind)
+    # Errors weigh as they are expected to be: a place a metre off turns the bearing of a near look far.
+    alike = (kind[:, None] == kind) / (kind[:, None] == kind).sum(axis=0)
+    for _ in range(2):
+        sizes = [np.sqrt((variance_of(one.H, found) + found.white**2) @ alike) for one in some]
+        found = _fit(some, sizes, groups, kind)
+    return found
+
+
+def _plausible(
+    errors: Sequence[Errors], scale: Array, groups: Sequence[list[int]]
+) -> list[NDArray[np.bool_]]:
+    """Which errors of each target are not gross: `GROSS` times what is usual, whatever they may come of."""
+    least = [np.abs(one.error) / scale for one in errors]
+    for group in groups:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            causes = [np.abs(one.error) / np.linalg.norm(one.H[..., group], axis=-1) for one in errors]
+        causes = [np.where(np.isfinite(one), one, np.inf) for one in causes]
+        every = np.concatenate(causes)
+        for element in range(len(scale)):
+            known = every[np.isfinite(every[:, element]), element]
+            usual = np.median(known) / MEDIAN_OF_NORMAL if len(known) else 1.0
+            for one, cause in zip(least, causes, strict=True):
+                one[:, element] = np.fmin(one[:, element], cause[:, element] / max(usual, 1e-12))
+    return [one.known & (off < GROSS).all(axis=1) for one, off in zip(errors, least, strict=True)]
+
+
+def _fit(
+    errors: Sequence[Errors], sizes: Sequence[Array], groups: Sequence[list[int]], kind: NDArray[np.intp]
+) -> Noise:
+    """The noise of errors that are as large as ``sizes`` (N, m), of elements of the ``kind`` (m,)."""
+    m, kinds = len(kind), int(kind.max()) + 1
+    count = kinds + len(groups)
+    gram, product = np.zeros((len(LAGS_S), count, count)), np.zeros((len(LAGS_S), count))
+    gaps = [np.zeros(0)]
+    for (t, error, H), size in zip(errors, sizes, strict=True):
+        e, H, apart = error / size, H / size[..., None], 0
         gaps.append(np.diff(t))
         while apart < len(t):
             i, j = slice(0, len(t) - apart), slice(apart, None)
-            pairs = np.zeros((len(t) - apart, m, m, size))
-            for column, group in enumerate(groups, start=len(kinds)):
+            pairs = np.zeros((len(t) - apart, m, m, count))
+            for column, group in enumerate(groups, start=kinds):
                 pairs[..., column] = H[i][..., group] @ np.swapaxes(H[j][..., group], 1, 2)
             if not apart:
-                pairs[:, range(m), range(m), : len(kinds)] = white
+                pairs[:, range(m), range(m), kind] = 1 / size**2
             # The nearest lag, the first of which is none.
             place = np.searchsorted(LAGS_S[1:] * LAG_STEP**-0.5, t[j] - t[i], side="right")
             np.add.at(gram, place, np.einsum("nabc,nabd->ncd", pairs, pairs))
             np.add.at(product, place, np.einsum("nabc,na,nb->nc", pairs, e[i], e[j]))
             apart = max(apart + 1, apart * 3 // 2)
     # What lasts no longer than from one error to the next is white.
-    shortest = 2 * float(np.median(np.concatenate(gaps))) if sum(map(len, gaps)) else 0.0
+    every = np.concatenate(gaps)
+    shortest = 2 * float(np.median(every)) if len(every) else 0.0
     tries = [(*_variances(gram, product, time_s), float(time_s)) for time_s in LAGS_S[shortest < LAGS_S]]
     _, variances, time_s = min(tries, key=lambda one: one[0])
     lasting = np.zeros(errors[0].H.shape[-1])
-    for group, variance in zip(groups, variances[len(kinds) :], strict=True):
+    for group, variance in zip(groups, variances[kinds:], strict=True):
         lasting[group] = np.sqrt(variance)
-    return Noise(np.maximum(np.sqrt(variances[: len(kinds)])[kind], LEAST_WHITE * scale), lasting, time_s)
+    usual = np.sqrt(np.median(np.concatenate([size**2 for size in sizes] or [np.ones((1, m))]), axis=0))
+    return Noise(np.maximum(np.sqrt(variances[:kinds])[kind], LEAST_WHITE * usual), lasting, time_s)
 
 
 def _variances(gram: Array, product: Array, time_s: float) -> tuple[float, Array]:
