@@ -67,6 +67,8 @@ from wildlab.geometry.frames import Array
 
 #: Detections an image from which on defaults are said to fit badly: more than anyone looks through.
 MANY = 10
+#: Images that tracks need at least: fewer than a track is believed from.
+FEWEST_TRACKED = 3
 
 
 #: Bytes of an earlier run's result.json at most.
@@ -223,7 +225,15 @@ def detect_images(request: DetectRequest, console: Console) -> dict[str, Any]:
         raise boxes.of_other_frames(detected.frames["frame_id"])
     tracks = None
     (request.out / "tracks.csv").unlink(missing_ok=True)
-    if request.tracks and (detected.frames["problem"].fillna("") == "").any():
+    usable = int((detected.frames["problem"].fillna("") == "").sum())
+    if request.tracks and usable < FEWEST_TRACKED:
+        raise WildlabError(
+            f"{usable} images can be used, and what is the same animal shows over {FEWEST_TRACKED} at least",
+            "leave --tracks out, or give a video",
+            file=request.images,
+            field="--tracks",
+        )
+    if request.tracks:
         with _progress(console, "tracking", frames.count) as tell:
             tracks, tracked = _tracks(request, frames, detected, lambda done: tell(done, None))
     judged = judge_detections(detected.detections, detected.frames, labels) if labels is not None else None
@@ -234,7 +244,6 @@ def detect_images(request: DetectRequest, console: Console) -> dict[str, Any]:
             frames, names, things, request.out, request.overlays, lambda done: tell(done, None), tracks
         )
     result = _result(request, thresholds, detected, judged, fitted, part, pictures, labels)
-    usable = result["frames"]["usable"]
     chosen = bool(request.fit or request.thresholds or request.distance_m is not None)
     result["notes"] = [
         *facts_of_frames(frames, detected),

@@ -32,7 +32,7 @@ from wildlab.flight.schema import POSITION
 from wildlab.flight.store import Flight
 from wildlab.flight.terrain import undulation
 from wildlab.geometry.frames import Array, ned_to_geodetic, normal_gravity
-from wildlab.paths import ROOT
+from wildlab.paths import DATA, ROOT
 from wildlab.sharing.allow_list import DATA_ADDRESS, FORMS, own_phrases, own_vocabulary, sheet_words
 from wildlab.sharing.generalisation import Generalised, first_stamp, names_in, new_origin
 from wildlab.sharing.recomputation import Source
@@ -411,8 +411,10 @@ def parts_of(word: str) -> tuple[str, ...]:
 
 @cache
 def _longer_words(part: str) -> tuple[tuple[str, int], ...]:
-    """Words of reports and of the sheets that a name is a part of, and where in them it begins."""
-    words = own_vocabulary() | sheet_words()
+    """Words of reports, of the sheets and of their styles that a name is a part of, and where in them it
+    begins."""
+    styles = "".join(one.read_text(encoding="utf-8") for one in sorted((DATA / "pages").glob("*.css")))
+    words = own_vocabulary() | sheet_words() | set(_PARTS.findall(styles.casefold()))
     spelt = words | set(map(_bare, words))
     return tuple((word, word.index(part)) for word in sorted(spelt) if part in word)
 

@@ -135,7 +135,8 @@ def test_a_mistake_is_named(make_flight, cause):
 
 
 @pytest.mark.parametrize(
-    ("late", "tilt", "cause"), [(0.4, 2.0, "clock of the camera"), (0.0, 6.0, "camera turned")]
+    ("late", "tilt", "cause"),
+    [(0.4, 2.0, "clock of the camera"), (0.0, 6.0, "camera turned"), (0.5, 6.0, "camera turned")],
 )
 def test_a_clock_that_is_late_is_not_blamed_on_the_mount(make_flight, late, tilt, cause):
     """Of lines flown there and back the turns tell which; 0.4 s are 3.4 deg at 12 m/s and 80 m."""

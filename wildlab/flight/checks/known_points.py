@@ -653,8 +653,8 @@ def turn_and_clock_mistakes(s: Sightings, flight: Flight) -> Iterator[Mistake[Si
     """A camera that is turned against its mount by a constant, as a tilt that was not stated; and a clock of
     the camera that is late or early by a constant, by leap seconds or by a zone.
 
-    On one course both move points alike: where these tell the clock, the turn is what is left beside it, and
-    a small one comes off with the clock.
+    On one course both move points alike: where these tell the clock, the turn is what is left beside it. A
+    small one comes off with the clock, and the clock with a large one.
     """
     timed, offset_s = flight.timed, flight.manifest.clocks.camera_offset_s
     late = best_of(lambda t: sighting_cost(s.shifted(t)), CLOCKS) if timed else 0.0
@@ -672,7 +672,8 @@ def turn_and_clock_mistakes(s: Sightings, flight: Flight) -> Iterator[Mistake[Si
     if TURNED_DEG < size < LARGEST_TURN_DEG:
         tilt, pan, roll = np.degrees(e)
         facts = {"size": size, "tilt": tilt, "pan": pan, "roll": roll}
-        yield mistake(one_row("constant-turn"), turned, fitted=True, **facts)
+        undo = (lambda x: turned(x.shifted(late))) if told else turned
+        yield mistake(one_row("constant-turn"), undo, fitted=True, **facts)
     if not timed:
         return
 
