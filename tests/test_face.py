@@ -122,6 +122,16 @@ def test_correlated_values_are_worth_less():
     assert mean.high - mean.low > 10 * (lambda band: band[1] - band[0])(chi_square_interval(2, runs=2000)) / 2
 
 
+def test_means_of_unlike_runs_lie_in_their_band_as_often_as_it_says():
+    """A thousand values that are worth twenty beside a thousand that are worth all: an honest filter's."""
+    rng, inside = np.random.default_rng(2), 0
+    for _ in range(400):
+        slow, white = np.repeat(rng.chisquare(2, 20), 50), rng.chisquare(2, 1000)
+        runs = [Series("NIS", 2, np.arange(1000.0), one, n) for one, n in ((slow, 20.0), (white, 1000.0))]
+        inside += mean_of_runs(runs).inside
+    assert 0.92 < inside / 400 < 0.98
+
+
 @pytest.mark.slow
 def test_every_result_has_a_figure(ship):
     points = wildlab.georeference(ship, source="autopilot")

@@ -536,7 +536,8 @@ def mean_of_runs(runs: Sequence[Series]) -> Average:
     Returns
     -------
     Average
-        ``worth`` is the sum of what each run is worth.
+        ``worth`` is less than the sum of what each run is worth where runs differ in what a value is: variances
+        of their sums add up.
 
     Examples
     --------
@@ -548,4 +549,5 @@ def mean_of_runs(runs: Sequence[Series]) -> Average:
     values = np.concatenate([np.asarray(run.values, float) for run in runs])
     known = np.array([np.isfinite(run.values).sum() for run in runs])
     dof = float(np.average([run.dof for run in runs], weights=known)) if known.any() else runs[0].dof
-    return average(values, dof, sum(run.worth for run in runs))
+    lost = sum(n**2 / run.worth for n, run in zip(known, runs, strict=True) if n)
+    return average(values, dof, known.sum() ** 2 / lost if lost else 0.0)

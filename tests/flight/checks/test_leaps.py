@@ -1,5 +1,7 @@
 """A leap of a position is told from a clock that is off, on flights with one, the other, or both."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -10,7 +12,7 @@ from tests.flight.checks.flights import track
 from tests.flight.checks.test_mistakes_named import moved, scale
 from wildlab.flight.checks.check import find
 from wildlab.flight.checks.findings import Finding
-from wildlab.flight.checks.motion import find_leaps, positions, without_leaps
+from wildlab.flight.checks.motion import find_leaps, positions, stray_places, without_leaps
 
 
 def causes(found: list[Finding]) -> set[str]:
@@ -92,3 +94,17 @@ def test_turns_of_a_log_of_a_second_without_velocities_are_no_leaps(speed, radiu
     places = places + np.random.default_rng(1).normal(0, 0.1, places.shape)
     table = pd.DataFrame(places, columns=["north_m", "east_m"]).assign(down_m=-80.0, time_s=times)
     assert not [one for one in find_leaps(table) if np.hypot(*one.by[:2]) > 25]
+
+
+@pytest.mark.parametrize(("row", "by", "named"), [(0, 5e4, 1), (300, 5e4, 1), (-1, 9e5, 1), (300, 60.0, 0)])
+def test_a_place_that_nothing_goes_to_is_named(row, by, named):
+    flight = track()
+    nav = flight.nav["autopilot"].copy()
+    nav.loc[nav.index[row], "north_m"] += by
+    spoilt = replace(flight, nav={"autopilot": nav})
+    found = [one for one in stray_places(spoilt)]
+    assert len(found) == named and not list(stray_places(flight))
+    for one in found:
+        assert (one.table, one.facts["n"]) == ("nav/autopilot", 1)
+        assert one.facts["size"] == pytest.approx(by, rel=0.01)
+        assert one.code in {finding.code for finding in find(spoilt)}

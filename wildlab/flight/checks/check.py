@@ -33,6 +33,7 @@ from wildlab.flight.checks.motion import (
     motion,
     origin,
     positions,
+    stray_places,
     together,
     without_leaps,
 )
@@ -748,6 +749,7 @@ PLAIN: tuple[Question, ...] = (
     sensors,
     duplicates,
     held_against_itself,
+    stray_places,
     image,
     inertial,
     turning,

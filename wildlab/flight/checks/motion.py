@@ -408,6 +408,27 @@ def leaps(found: Iterable[Leap]) -> Iterator[Finding]:
         yield Finding("problem", table, "north_m", "leap", facts, (LEAP,))
 
 
+#: Nothing that is tracked is faster, m/s; a place is far from those before and after it from here, m.
+FASTEST, STRAY_M = 340.0, 100.0
+
+
+def stray_places(flight: Flight) -> Iterator[Finding]:
+    """Rows whose place nothing can go to and come back from in the time."""
+    tables = {f"nav/{name}": table for name, table in flight.nav.items()}
+    if flight.truth is not None and len(flight.truth):
+        tables |= {f"truth of {one}": rows for one, rows in flight.truth.groupby("target_id", sort=False)}
+    for name, table in tables.items():
+        values = table[["time_s", *POSITION]].to_numpy(float) if "time_s" in table else np.empty((0, 4))
+        values = values[np.isfinite(values).all(axis=1)]
+        gone, step = np.linalg.norm(np.diff(values[:, 1:], axis=0), axis=1), np.diff(values[:, 0])
+        far = (gone > np.maximum(STRAY_M, FASTEST * step)) & (step > 0)
+        stray = np.append(far, True) & np.insert(far, 0, True) if far.any() else np.zeros(0, bool)
+        if stray.any():
+            row = int(np.flatnonzero(stray)[0])
+            facts = {"n": int(stray.sum()), "at": values[row, 0], "size": gone[max(row - 1, 0)]}
+            yield Finding("warning", name.partition(" of ")[0], "north_m", "stray-places", facts)
+
+
 # -- where the flight is: about its origin, and its tables near each other
 
 #: From here on a local level at the origin is worth a word, and from there on it cannot serve (m): attitudes
