@@ -536,8 +536,8 @@ def mean_of_runs(runs: Sequence[Series]) -> Average:
     Returns
     -------
     Average
-        ``worth`` is less than the sum of what each run is worth where runs differ in what a value is: variances
-        of their sums add up.
+        ``worth`` is less than the sum of what runs are worth where values of one are worth more than those of
+        another: variances of their sums add up.
 
     Examples
     --------

@@ -436,6 +436,8 @@ def _many(
             write_atomic(file, dump_toml(told.model_dump(exclude_none=True)))
             report = f"{source.name}{MANY}"
             notes = [describe("note-settings", report=report, name=repr(one)) for one in left_out]
+        if given.get("tuned"):
+            notes.append(describe("note-untuned", report=f"{source.name}{MANY}"))
         sensors = given.get("sensors") or ()
         poses = given.get("source")
         outcome = track_many(
