@@ -288,6 +288,7 @@ REASONS = [
     ((accuracy(found=diagnosis(NOTHING)),), "reason-sound"),
     ((accuracy(found=diagnosis(MOST)),), "reason-gain"),
     ((accuracy(found=diagnosis(UNSURE)),), "reason-possible"),
+    ((accuracy(found=replace(diagnosis(NOTHING), misfit=True)),), "reason-misfit"),
     ((accuracy(found=diagnosis(NOTHING, outliers=(FAR,))),), "reason-outliers"),
     ((accuracy(50, 0, "too small", (1.3, 1.1, 1.5), diagnosis(NOTHING)),), "reason-ellipses"),
     ((accuracy(50, 0, "too large", (0.2, 0.1, 0.4), diagnosis(NOTHING)),), "reason-ellipses-long"),

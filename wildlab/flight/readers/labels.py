@@ -520,14 +520,9 @@ def read_table(data: bytes, path: Path, *, group: str | None = None, clicks: boo
     if name is None:
         raise fail(f"no column names the image: there are {shown}", f"use one of {', '.join(IMAGE_COLUMNS)}")
     if way is None:
-        there = set(bare)
-        nearest = min(
-            (set(bare_names(one)) - there for one in WAYS if not clicks and len(one) > 2),
-            key=len,
-            default=there,
-        )
-        if len(nearest) == 1:
-            raise fail(f"a box has no column {nearest.pop()}: there are {shown}", "add it")
+        for one in (set(bare_names(way)) - set(bare) for way in WAYS if len(way) > 2 and not clicks):
+            if len(one) == 1:
+                raise fail(f"a box has no column {one.pop()}: there are {shown}", "add it")
         known = "; ".join(", ".join(one) for one in WAYS if clicks or one != ("x", "y"))
         raise fail(f"no columns say where things are: there are {shown}", f"call them one of: {known}")
     if group is not None and group not in header:
