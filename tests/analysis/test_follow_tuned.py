@@ -123,6 +123,7 @@ def test_a_track_carried_to_the_looks_of_another_sensor_is_the_less_certain():
         np.testing.assert_allclose(P, (F @ track.covariance[20] @ F.T + Q)[:2, :2], rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_several_flights_teach_together_and_one_more_does_not_move_what_is_alike():
     """Twice the same one teaches the same; of two clocks there is one between them."""
     one, other = (robot_flight(seed, kind="position", seconds=200.0, correlation=0.9) for seed in (1, 2))
@@ -137,6 +138,7 @@ def test_several_flights_teach_together_and_one_more_does_not_move_what_is_alike
     assert -1.2 < tune_flights(late, ["radar"]).sensors["radar"].offset_s < -0.4
 
 
+@pytest.mark.slow
 def test_what_lasts_is_tuned_for_many_targets_too():
     """Errors that last taken for white make tracks of many targets too sure of themselves."""
     teachers = [robot_flight(seed, kind="position", seconds=400.0, correlation=0.9) for seed in (1, 2)]
