@@ -10,7 +10,7 @@ from filterpy.kalman import KalmanFilter
 from tests.analysis.conftest import changed
 from tests.analysis.robots import boat, paused, robot_flight, rows_of, seen_only
 from tests.refused import refused
-from wildlab.analysis.tracks import tracker
+from wildlab.analysis.tracks import tracker, tuning
 from wildlab.analysis.tracks.many import track_jointly
 from wildlab.analysis.tracks.tracker import _between
 from wildlab.analysis.tracks.tuning import read_tuned, refuse_same, tune_flights, tuned_text
@@ -159,3 +159,22 @@ def test_what_lasts_is_tuned_for_many_targets_too():
     assert (sensor.correlation, sensor.lasting_s) == (one.next_correlation, one.correlation_time_s)
     assert not found.unknown_correlation
     assert 1.5 < squares[False] < 2.7 and squares[True] > 10.0
+
+
+def test_what_was_tuned_as_each_target_s_own_is_not_the_platform_s_too():
+    flight = robot_flight(3, heading_sd_deg=2.0, labelled=False, seconds=60.0)
+    tuned = tune_flights([robot_flight(1, heading_off_deg=2.0, seconds=200.0)], ["radar"])
+    assert track_jointly(flight).lasting_s and tuned.sensors["radar"].next_correlation > 0
+    assert not track_jointly(flight, tuned=tuned).lasting_s
+
+
+def test_flights_that_teach_lie_further_apart_than_anything_lasts(monkeypatch):
+    given = []
+
+    def clock(errors_at, *_):
+        given.extend(errors_at(0.0))
+        return 0.0, 0.0, 0.0
+
+    monkeypatch.setattr(tuning, "_clock", clock)
+    tune_flights([robot_flight(1, seconds=60.0), robot_flight(2, seconds=60.0)], ["radar"])
+    assert given[1].times.min() - given[0].times.max() > 100 * tuning.LAGS_S[-1]
