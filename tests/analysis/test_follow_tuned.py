@@ -11,7 +11,7 @@ from tests.analysis.conftest import changed
 from tests.analysis.robots import boat, paused, robot_flight, rows_of, seen_only
 from tests.refused import refused
 from wildlab.analysis.tracks import tracker, tuning
-from wildlab.analysis.tracks.many import track_jointly
+from wildlab.analysis.tracks.many import track_jointly, with_tuned
 from wildlab.analysis.tracks.tracker import _between
 from wildlab.analysis.tracks.tuning import read_tuned, refuse_same, tune_flights, tuned_text
 from wildlab.evaluation.consistency import nees
@@ -166,6 +166,9 @@ def test_what_was_tuned_as_each_target_s_own_is_not_the_platform_s_too():
     tuned = tune_flights([robot_flight(1, heading_off_deg=2.0, seconds=200.0)], ["radar"])
     assert track_jointly(flight).lasting_s and tuned.sensors["radar"].next_correlation > 0
     assert not track_jointly(flight, tuned=tuned).lasting_s
+    # What is stated of how long errors last goes first.
+    stated = parse_settings("[sensors.radar]\ncorrelation = 0.3\n")
+    assert with_tuned(stated, tuned) == (stated, {}) != with_tuned(parse_settings(""), tuned)
 
 
 def test_flights_that_teach_lie_further_apart_than_anything_lasts(monkeypatch):

@@ -81,7 +81,7 @@ _HULLS = {
 
 
 def model_jointly(
-    settings: Settings, single: TargetModel, places: list[PlacedScans], tuned: Tuned | None = None
+    settings: Settings, single: TargetModel, places: list[PlacedScans], says: Mapping[str, str] = {}
 ) -> tuple[ManyTargetModel, list[ManySensorModel], list[GivenValue]]:
     """What the tracker is given of the targets and of each sensor, and where each value is from.
 
@@ -93,8 +93,8 @@ def model_jointly(
         What filters of one target are given of the targets.
     places
         Of every sensor.
-    tuned
-        What other flights say of the sensors, beside what is stated.
+    says
+        By sensor, who says how long errors last where the settings had not: of `with_tuned`.
 
     Raises
     ------
@@ -116,12 +116,12 @@ def model_jointly(
     values["hits"] = int(values["hits"])
     targets = ManyTargetModel(hulls, single.density, single.start_speed_m_s, **values)
     farthest = max((float(one.distances().max(initial=0.0)) for one in places), default=0.0)
-    each = [_of_sensor(settings, one, len(hulls), farthest, tuned) for one in places]
+    each = [_of_sensor(settings, one, len(hulls), farthest, says) for one in places]
     return targets, [one for one, _ in each], [*given.values, *(value for _, more in each for value in more)]
 
 
 def _of_sensor(
-    settings: Settings, placed: PlacedScans, kinds: int, farthest: float, tuned: Tuned | None
+    settings: Settings, placed: PlacedScans, kinds: int, farthest: float, says: Mapping[str, str]
 ) -> tuple[ManySensorModel, list[GivenValue]]:
     """``farthest``: m, the farthest detection of any sensor, for one that knows no distances."""
     part = settings.sensors.get(placed.sensor, SensorPart())
@@ -167,12 +167,8 @@ def _of_sensor(
     )
     if placed.kind in PLACED and placed.kind != "pixel":
         share, lasts = correlated_share(part)
-        source = ASSUMED if part.correlation is None else STATED
-        if part.correlation is None and tuned is not None and placed.sensor in tuned.sensors:
-            one_tuned = tuned.sensors[placed.sensor]
-            share, lasts = one_tuned.next_correlation, one_tuned.correlation_time_s
-            source = tuned.words
         words = f"{share:.2g}, for {lasts:.3g} s" if share else "0"
+        source = ASSUMED if part.correlation is None else says.get(placed.sensor, STATED)
         given.add("share of the errors' variance that lasts", words, source)
         found = found._replace(correlation=share, lasting_s=lasts)
     for name, what in _HULLS.items():
@@ -190,10 +186,23 @@ def correlated_share(part: SensorPart) -> tuple[float, float]:
     return part.correlation, part.correlation_time_s or np.inf
 
 
-def unknown_correlation(
-    settings: Settings, places: Mapping[str, PlacedScans], tuned: Tuned | None = None
-) -> list[str]:
-    """Sensors of which nobody says how long their errors last, and no other flight against its truth.
+def with_tuned(stated: Settings, tuned: Tuned | None) -> tuple[Settings, dict[str, str]]:
+    """The settings, with how long errors last from other flights with truth where nobody states it; and who
+    says so, by sensor."""
+    if tuned is None or tuned.against != "truth":
+        return stated, {}
+    filled = dict(stated.sensors)
+    for name, one in tuned.sensors.items():
+        part = stated.sensors.get(name, SensorPart())
+        if part.correlation is None and part.correlation_time_s is None and part.thinning_s is None:
+            lasts = {"correlation": one.next_correlation, "correlation_time_s": one.correlation_time_s}
+            filled[name] = part.model_copy(update=lasts | {"thinning_s": one.thinning_s})
+    changed = [name for name, part in filled.items() if part is not stated.sensors.get(name)]
+    return stated.model_copy(update={"sensors": filled}), dict.fromkeys(changed, tuned.words)
+
+
+def unknown_correlation(settings: Settings, places: Mapping[str, PlacedScans]) -> list[str]:
+    """Sensors of which nobody says how long their errors last.
 
     It is stated by ``correlation``, zero too, or considered errors; of a camera's pixels by
     ``correlation_time_s`` or considered errors, of bearings by ``thinning_s``.
@@ -202,8 +211,6 @@ def unknown_correlation(
     for name, one in places.items():
         part = settings.sensors.get(name, SensorPart())
         key = {"pixel": "correlation_time_s", "bearing": "thinning_s"}.get(one.kind, "correlation")
-        if tuned is not None and tuned.against == "truth" and name in tuned.sensors:
-            continue
         if getattr(part, key) is None and (one.bearings or not part.considered):
             found.append(name)
     return found
@@ -334,19 +341,16 @@ def track_jointly(
         As that, and where no detection tells a place.
     """
     inputs = read_inputs(flight, settings=settings, tuned=tuned, sensors=sensors, source=source, joint=True)
-    stated = inputs.settings
+    stated, says = with_tuned(inputs.settings, tuned)
     given = [one for one in inputs.given if one.what.startswith(("acceleration", "speed"))]
     notes = list(inputs.notes)
     places: dict[str, PlacedScans] = {}
     for name, (scanned, belief, _, more) in inputs.sensors.items():
         given_here, unused = _considered_apart(list(dict.fromkeys(more)), scanned.kind)
         given += given_here
-        part, says = stated.sensors.get(name, SensorPart()), STATED
-        if tuned is not None and name in tuned.sensors and part.correlation_time_s is None:
-            lasts, says = tuned.sensors[name].correlation_time_s, tuned.words
-            part = part.model_copy(update={"correlation_time_s": lasts})
+        part = stated.sensors.get(name, SensorPart())
         if scanned.kind == "pixel":
-            given += given_of_pixels(flight, scanned, part, says)
+            given += given_of_pixels(flight, scanned, part, says.get(name, STATED))
         if unused:
             bearing = scanned.kind == "bearing"
             what = "Errors" if bearing else "An error of the clock"
@@ -371,7 +375,7 @@ def track_jointly(
             file=flight.folder,
             field="detections.kind",
         )
-    targets, models, more_given = model_jointly(stated, inputs.targets, list(places.values()), tuned)
+    targets, models, more_given = model_jointly(stated, inputs.targets, list(places.values()), says)
     lasting_s, shared = align_errors(
         [(one.errors, [scan.shared for scan in one.scans]) for one in places.values()]
     )
@@ -403,7 +407,7 @@ def track_jointly(
         inputs.targets.reach_m if np.isfinite(inputs.targets.reach_m) else CUTOFF_M,
         truth_sd,
         stated.targets.others,
-        unknown_correlation(stated, places, tuned),
+        unknown_correlation(stated, places),
         estimated,
     )
 

@@ -174,17 +174,19 @@ class _Seen:
 def _tuned(seen: Sequence[_Seen], offsets: Array) -> SensorTuning:
     """The tuning with the best of some offsets; of one alone its interval is NaN."""
 
-    def errors_at(offset: float) -> list[Errors]:
-        return [
-            one._replace(times=one.times + APART_S * number)
-            for number, each in enumerate(seen)
-            for one in each.errors(offset)[0]
-        ]
+    def errors_at(offset: float) -> tuple[list[Errors], list[Array]]:
+        found, away = list[Errors](), list[Array]()
+        for number, each in enumerate(seen):
+            errors, distances = each.errors(offset)
+            found += [one._replace(times=one.times + APART_S * number) for one in errors]
+            away += distances
+        return found, away
 
     offset, low, high = float(offsets[np.argmin(np.abs(offsets))]), float("nan"), float("nan")
     if len(offsets) > 1:
-        offset, low, high = _clock(errors_at, offsets, offset, all(one.at_rest for one in seen))
-    scans, errors = seen[0].scans(offset), errors_at(offset)
+        at_rest = all(one.at_rest for one in seen)
+        offset, low, high = _clock(lambda shift: errors_at(shift)[0], offsets, offset, at_rest)
+    scans, (errors, away) = seen[0].scans(offset), errors_at(offset)
     n, m = sum(int(one.known.sum()) for one in errors), scans.detections.shape[-1]
     if n < FEWEST:
         raise WildlabError(
@@ -197,7 +199,6 @@ def _tuned(seen: Sequence[_Seen], offsets: Array) -> SensorTuning:
     H = np.concatenate([one.H[one.known] for one in errors])
     lasting = variance_of(H, noise).mean(axis=0)
     total = noise.white**2 + lasting
-    away = [distance for each in seen for distance in each.errors(offset)[1]]
     distance = np.concatenate([far[one.known] for far, one in zip(away, errors, strict=True)])
     alike = len({NOISE_OF[name] for name in scans.elements}) == 1
     by_group = [noise.lasting[group[0]] if group else 0.0 for group in _groups(scans, every=True)]
@@ -392,7 +393,7 @@ def _fit(
     lasting = np.zeros(errors[0].H.shape[-1])
     for group, variance in zip(groups, variances[kinds:], strict=True):
         lasting[group] = np.sqrt(variance)
-    usual = np.sqrt(np.median(np.concatenate([size**2 for size in sizes] or [np.ones((1, m))]), axis=0))
+    usual = np.sqrt(np.median(np.concatenate([size**2 for size in sizes]), axis=0))
     return Noise(np.maximum(np.sqrt(variances[:kinds])[kind], LEAST_WHITE * usual), lasting, time_s)
 
 
