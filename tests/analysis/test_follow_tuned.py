@@ -16,6 +16,7 @@ from wildlab.analysis.tracks.tracker import _between
 from wildlab.analysis.tracks.tuning import read_tuned, refuse_same, tune_flights, tuned_text
 from wildlab.evaluation.consistency import nees
 from wildlab.flight.manifest import parse_settings
+from wildlab.reporting.many_tracks import limits
 from wildlab.tracking.motion import white_acceleration
 
 
@@ -165,7 +166,11 @@ def test_what_was_tuned_as_each_target_s_own_is_not_the_platform_s_too():
     flight = robot_flight(3, heading_sd_deg=2.0, labelled=False, seconds=60.0)
     tuned = tune_flights([robot_flight(1, heading_off_deg=2.0, seconds=200.0)], ["radar"])
     assert track_jointly(flight).lasting_s and tuned.sensors["radar"].next_correlation > 0
-    assert not track_jointly(flight, tuned=tuned).lasting_s
+    found = track_jointly(flight, tuned=tuned)
+    assert not found.lasting_s
+    # The page says which errors are in no covariance: these are in it, and are not where nobody says so.
+    plain = track_jointly(robot_flight(3, labelled=False, seconds=60.0))
+    assert ["limit-bare" in [one.key for one in limits(many)] for many in (plain, found)] == [True, False]
     # What is stated of how long errors last goes first.
     stated = parse_settings("[sensors.radar]\ncorrelation = 0.3\n")
     assert with_tuned(stated, tuned) == (stated, {}) != with_tuned(parse_settings(""), tuned)

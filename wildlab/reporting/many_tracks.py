@@ -175,7 +175,11 @@ def limits(followed: ManyTracks) -> list[Message]:
     kinds = {one.kind for one in followed.places.values()}
     every = {name: one.errors for name, one in followed.places.items()}
     platform = {"heading", "platform_north", "platform_east"}
-    bare = [name for name, errors in every.items() if not platform & platform_errors(errors)]
+    # What lasts of each target's own errors holds those of the platform, too.
+    own_last = {one.name for one in followed.sensors if one.correlation}
+    bare = [
+        name for name, errors in every.items() if not (platform & platform_errors(errors) or name in own_last)
+    ]
     shared = [
         name for name, own in every.items() if any(counts_twice(own, errors) for errors in every.values())
     ]
